@@ -1,0 +1,113 @@
+//! What can go wrong, where, and what to do about it.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The crate's result.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Everything that can fail. Each message names what failed and where, and says what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused to read or write.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        /// The file concerned.
+        path: PathBuf,
+        /// What was being done: "read", "write", "create", "rename".
+        action: &'static str,
+        /// The system's own reason.
+        source: std::io::Error,
+    },
+    /// A file or byte string is not what its format promises.
+    #[error("{name}: {place}{problem}{}", Remedy(remedy))]
+    Format {
+        /// The file's name, or what the bytes are called where there is no file.
+        name: String,
+        /// Where in the input.
+        place: Place,
+        /// What is wrong there.
+        problem: String,
+        /// What the user can do, or empty.
+        remedy: String,
+    },
+    /// A setting is out of range or contradicts another one.
+    #[error("{option}: {problem}{}", Remedy(remedy))]
+    Setting {
+        /// The setting's name as the user writes it, for example `depth`.
+        option: &'static str,
+        /// What is wrong with its value.
+        problem: String,
+        /// What the user can do, or empty.
+        remedy: String,
+    },
+    /// The caller's [`Progress`](crate::progress::Progress) asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl Error {
+    /// An I/O error with its file and the action that failed.
+    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
+        Error::Io { path: path.as_ref().to_owned(), action, source }
+    }
+
+    /// A format error at a place, with a remedy (may be empty).
+    pub fn format(
+        name: impl Into<String>,
+        place: Place,
+        problem: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Error::Format { name: name.into(), place, problem: problem.into(), remedy: remedy.into() }
+    }
+
+    /// A setting that cannot be used, with a remedy (may be empty).
+    pub fn setting(option: &'static str, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Error::Setting { option, problem: problem.into(), remedy: remedy.into() }
+    }
+}
+
+/// A place in an input file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    Whole,
+    /// A line, counted from 1.
+    Line(u64),
+    /// A byte offset, counted from 0.
+    Byte(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Whole => Ok(()),
+            Place::Line(n) => write!(f, "line {n}: "),
+            Place::Byte(n) => write!(f, "byte {n}: "),
+        }
+    }
+}
+
+/// Appends "; remedy" when there is one.
+struct Remedy<'a>(&'a str);
+
+impl fmt::Display for Remedy<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() { Ok(()) } else { write!(f, "; {}", self.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_name_place_and_remedy() {
+        let e = Error::format("part.ply", Place::Line(1203), "face 88 refers to vertex 9001, but there are 9000", "");
+        assert_eq!(e.to_string(), "part.ply: line 1203: face 88 refers to vertex 9001, but there are 9000");
+        let e = Error::setting("scale", "1.5 is not below 1", "take 0.9");
+        assert_eq!(e.to_string(), "scale: 1.5 is not below 1; take 0.9");
+    }
+}

@@ -1,0 +1,16 @@
+//! zmend makes unusable solids usable.
+#![forbid(unsafe_code)]
+
+pub mod contour;
+pub mod error;
+pub mod geom;
+pub mod grid;
+pub mod io;
+pub mod mesh;
+pub mod octree;
+pub mod progress;
+pub mod repair;
+pub mod sign;
+
+pub use error::{Error, Place, Result};
+pub use mesh::{Mesh, Polygons};

@@ -1,0 +1,83 @@
+//! Indexed polygons, and what can be said about them.
+
+mod stream;
+
+pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
+
+use glam::DVec3;
+
+/// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
+/// [`report`](crate::mesh) tells which.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// Positions in model units.
+    pub points: Vec<DVec3>,
+    /// Polygons as cycles of indices into `points`, counter-clockwise seen from outside where orientation is right.
+    pub faces: Polygons,
+}
+
+/// A list of polygons in two arrays: the corners of all polygons one after another, and where each polygon ends.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Polygons {
+    corners: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+impl Polygons {
+    /// No polygons yet, with room for some.
+    pub fn with_capacity(polygons: usize, corners: usize) -> Self {
+        Polygons { corners: Vec::with_capacity(corners), ends: Vec::with_capacity(polygons) }
+    }
+
+    /// Makes room for exactly so many more polygons and corners.
+    pub fn reserve_exact(&mut self, polygons: usize, corners: usize) {
+        self.ends.reserve_exact(polygons);
+        self.corners.reserve_exact(corners);
+    }
+
+    /// Appends a polygon.
+    ///
+    /// # Panics
+    /// When all polygons together would have 2^32 corners or more.
+    pub fn push(&mut self, polygon: &[u32]) {
+        self.corners.extend_from_slice(polygon);
+        self.ends.push(u32::try_from(self.corners.len()).expect("fewer than 2^32 corners in a mesh"));
+    }
+
+    /// Number of polygons.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is no polygon.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The corners of polygon `i`.
+    ///
+    /// # Panics
+    /// When there is no polygon `i`.
+    pub fn get(&self, i: usize) -> &[u32] {
+        let start = if i == 0 { 0 } else { self.ends[i - 1] as usize };
+        &self.corners[start..self.ends[i] as usize]
+    }
+
+    /// All polygons in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> + '_ {
+        (0..self.len()).map(|i| self.get(i))
+    }
+
+    /// The corners of all polygons, one after another.
+    pub fn corners(&self) -> &[u32] {
+        &self.corners
+    }
+}
+
+impl<'a> FromIterator<&'a [u32]> for Polygons {
+    fn from_iter<I: IntoIterator<Item = &'a [u32]>>(iter: I) -> Self {
+        let mut polygons = Polygons::default();
+        iter.into_iter().for_each(|p| polygons.push(p));
+        polygons
+    }
+}

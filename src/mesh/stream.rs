@@ -1,0 +1,122 @@
+//! Meshes that pass by: sources that yield triangles without holding them, sinks that take a mesh as it is made.
+
+use super::Mesh;
+use crate::error::Result;
+use glam::DVec3;
+
+/// An axis-aligned box in model units. Empty when `min` exceeds `max`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Least coordinates.
+    pub min: DVec3,
+    /// Greatest coordinates.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// The box that holds nothing.
+    pub const EMPTY: Bounds = Bounds { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// Whether no point has been added.
+    pub fn is_empty(&self) -> bool {
+        !(self.min.x <= self.max.x)
+    }
+
+    /// Grows the box to hold `p`; points with a coordinate that is not finite are left out.
+    pub fn add(&mut self, p: DVec3) {
+        if p.is_finite() {
+            self.min = self.min.min(p);
+            self.max = self.max.max(p);
+        }
+    }
+
+    /// Edge lengths.
+    pub fn extent(&self) -> DVec3 {
+        self.max - self.min
+    }
+
+    /// Middle of the box.
+    pub fn center(&self) -> DVec3 {
+        self.min + 0.5 * self.extent()
+    }
+}
+
+/// What a source has passed on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SourceCounts {
+    /// Polygons of the input.
+    pub polygons: u64,
+    /// Triangles they were cut into.
+    pub triangles: u64,
+}
+
+/// Triangles in a repeatable order, readable any number of times. A file can be one without being held in memory.
+pub trait TriangleSource {
+    /// Bounds of the points that faces use; points that are not finite are left out.
+    ///
+    /// # Errors
+    /// When the input cannot be read or is malformed.
+    fn bounds(&mut self) -> Result<Bounds>;
+
+    /// Calls `sink` with batches of triangles (some thousands each) until all have passed or `sink` fails.
+    /// Corners that are not finite are passed on as they are.
+    ///
+    /// # Errors
+    /// When the input cannot be read or is malformed, and whatever `sink` returns.
+    fn triangles(&mut self, sink: &mut dyn FnMut(&[[DVec3; 3]]) -> Result<()>) -> Result<SourceCounts>;
+
+    /// Number of triangles if known beforehand, for progress bars.
+    fn size_hint(&self) -> Option<u64> {
+        None
+    }
+}
+
+/// The exact size of a mesh that is about to be passed to a [`MeshSink`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct MeshSizes {
+    /// Number of points.
+    pub points: u64,
+    /// Number of faces.
+    pub faces: u64,
+    /// Sum of the numbers of corners of all faces.
+    pub corners: u64,
+}
+
+/// Takes a mesh piece by piece: [`begin`](Self::begin), then all points, then all faces.
+pub trait MeshSink {
+    /// Says how much will come.
+    ///
+    /// # Errors
+    /// When the sink cannot take that much, or cannot write.
+    fn begin(&mut self, sizes: MeshSizes) -> Result<()>;
+
+    /// Takes the next points, in model units.
+    ///
+    /// # Errors
+    /// When the sink cannot write.
+    fn points(&mut self, points: &[DVec3]) -> Result<()>;
+
+    /// Takes the next faces, all with `arity` corners, as indices into the points; `corners.len()` is a multiple of `arity`.
+    ///
+    /// # Errors
+    /// When the sink cannot write.
+    fn faces(&mut self, arity: usize, corners: &[u32]) -> Result<()>;
+}
+
+impl MeshSink for Mesh {
+    fn begin(&mut self, sizes: MeshSizes) -> Result<()> {
+        self.points.reserve_exact(sizes.points as usize);
+        self.faces.reserve_exact(sizes.faces as usize, sizes.corners as usize);
+        Ok(())
+    }
+
+    fn points(&mut self, points: &[DVec3]) -> Result<()> {
+        self.points.extend_from_slice(points);
+        Ok(())
+    }
+
+    fn faces(&mut self, arity: usize, corners: &[u32]) -> Result<()> {
+        corners.chunks_exact(arity).for_each(|face| self.faces.push(face));
+        Ok(())
+    }
+}

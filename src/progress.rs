@@ -1,0 +1,61 @@
+//! How long work reports where it is, and how a caller stops it. The library itself never prints.
+
+use crate::error::{Error, Result};
+
+/// The stages of a repair, in the order in which they run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Reading and snapping the input; unit: bytes or points.
+    Read,
+    /// Rasterising triangles into crossings; unit: triangles.
+    Scan,
+    /// Closing holes; unit: rings.
+    Close,
+    /// Inside and outside; unit: bricks.
+    Sign,
+    /// Extracting the surface; unit: bricks.
+    Contour,
+    /// Writing the output; unit: bytes.
+    Write,
+}
+
+impl Stage {
+    /// The stage's name in lower case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Read => "read",
+            Stage::Scan => "scan",
+            Stage::Close => "close",
+            Stage::Sign => "sign",
+            Stage::Contour => "contour",
+            Stage::Write => "write",
+        }
+    }
+}
+
+/// Receives progress and may cancel. All methods have defaults that do nothing, and may be called from any thread.
+pub trait Progress: Sync {
+    /// A stage begins; `total` is the amount of work in the stage's unit, 0 when unknown.
+    fn begin(&self, stage: Stage, total: u64) {
+        let _ = (stage, total);
+    }
+    /// `amount` more of the current stage's work is done.
+    fn advance(&self, amount: u64) {
+        let _ = amount;
+    }
+    /// Asked often; `true` makes the running stage return [`Error::Cancelled`].
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Reports nothing and never cancels.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}
+
+/// `Err(Cancelled)` once the caller wants to stop.
+pub(crate) fn check(progress: &dyn Progress) -> Result<()> {
+    if progress.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+}

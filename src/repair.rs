@@ -1,0 +1,1 @@
+//! The pipeline: polygon soup in, closed manifold mesh out.
