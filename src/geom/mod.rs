@@ -1,1 +1,7 @@
-//! geom
+//! Floating-point and fixed-point geometry: the frame between model and lattice, exact rasterisation, QEF.
+
+pub mod frame;
+pub mod normal;
+pub mod raster;
+
+pub use frame::Frame;

@@ -4,6 +4,8 @@
 //! level is named by one packed 64-bit [`Key`], and whatever incidence is needed is arithmetic on keys.
 
 pub mod axis;
+pub mod brick;
+pub mod cases;
 pub mod key;
 
 pub use axis::{Axis, Corner, Direction, Edge, Extent, Face};
