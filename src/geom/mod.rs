@@ -2,6 +2,7 @@
 
 pub mod frame;
 pub mod normal;
+pub mod qef;
 pub mod raster;
 
 pub use frame::Frame;

@@ -330,7 +330,7 @@ impl Key {
     /// use zmend::grid::Key;
     ///
     /// let (a, b) = (Key::cell(9, [0, 0, 255]).unwrap(), Key::cell(4, [1, 0, 7]).unwrap());
-    /// assert_eq!(a.common_ancestor(b), Key::cell(1, [0, 0, 0]).unwrap());
+    /// assert_eq!(a.common_ancestor(b), Key::cell(3, [0, 0, 3]).unwrap());
     /// assert_eq!(a.common_ancestor(a), a);
     /// ```
     #[must_use]

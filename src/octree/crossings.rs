@@ -152,7 +152,7 @@ impl Crossings {
     pub fn bytes(&self) -> usize {
         self.bricks.capacity() * size_of::<Brick>()
             + 2 * (self.offsets.capacity() + self.normals.capacity())
-            + self.index.bytes()
+            + self.index.allocated_bytes()
     }
 
     /// The place of a brick in the list.

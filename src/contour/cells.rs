@@ -1,0 +1,192 @@
+//! The 512 cells of a brick at once, and the numbers of the crossings round them.
+
+use crate::grid::brick::{Bits, Local, Plane};
+use crate::grid::cases::Mask;
+use crate::grid::{Axis, Edge};
+use crate::octree::SignedOctree;
+use crate::octree::crossings::{Brick, toward};
+
+/// For each cell of a brick (named by its least corner): which of its edges are crossed, which of its corners are inside.
+pub(super) struct Cells<'a> {
+    brick: &'a Brick,
+    /// The bricks at +x, +y, +z, +x+y, +x+z, +y+z.
+    plus: [&'a Brick; 6],
+    /// By the number of the edge in the cell.
+    edges: [Plane; 12],
+    /// By the number of the corner.
+    corners: [Plane; 8],
+}
+
+impl<'a> Cells<'a> {
+    /// Brick number `i` of the octree.
+    pub(super) fn new(octree: &'a SignedOctree, i: usize) -> Self {
+        let crossings = octree.crossings();
+        let brick = &crossings.bricks()[i];
+        let plus = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1]]
+            .map(|steps| crossings.beside(brick, toward(steps)));
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, pxz, pyz] = plus.map(|b| &b.crossed);
+        let edges = [
+            *x,
+            x.at_plus_z(&pz[0]),
+            x.at_plus_y(&py[0]),
+            x.at_plus_y(&py[0]).at_plus_z(&pz[0].at_plus_y(&pyz[0])),
+            *y,
+            y.at_plus_z(&pz[1]),
+            y.at_plus_x(&px[1]),
+            y.at_plus_x(&px[1]).at_plus_z(&pz[1].at_plus_x(&pxz[1])),
+            *z,
+            z.at_plus_y(&py[2]),
+            z.at_plus_x(&px[2]),
+            z.at_plus_x(&px[2]).at_plus_y(&py[2].at_plus_x(&pxy[2])),
+        ];
+        // The sign changes along a crossed edge: corners follow from the least one.
+        let c0 = octree.inside()[i];
+        let (c1, c2, c4) = (c0 ^ edges[8], c0 ^ edges[4], c0 ^ edges[0]);
+        let (c3, c5, c6) = (c2 ^ edges[9], c4 ^ edges[10], c4 ^ edges[6]);
+        let corners = [c0, c1, c2, c3, c4, c5, c6, c6 ^ edges[11]];
+        Cells { brick, plus, edges, corners }
+    }
+
+    /// The cells with corners of both signs.
+    pub(super) fn mixed(&self) -> Plane {
+        self.edges.iter().fold(Plane::EMPTY, |a, &b| a | b)
+    }
+
+    /// Those of the mixed cells that may have several sheets, or one that is not a simple disc: cells with an ambiguous face (all four
+    /// edges crossed), or whose only corners of one sign are opposite to each other. All others have one sheet and one vertex.
+    pub(super) fn knotty(&self) -> Plane {
+        let e = &self.edges;
+        let all = |list: &[usize]| list.iter().fold(Plane::FULL, |a, &i| a & e[i]);
+        let none = |list: &[usize]| !list.iter().fold(Plane::EMPTY, |a, &i| a | e[i]);
+        let faces = [[4, 8, 5, 9], [6, 10, 7, 11], [0, 8, 1, 10], [2, 9, 3, 11], [0, 4, 2, 6], [1, 5, 3, 7]];
+        let ambiguous = faces.iter().fold(Plane::EMPTY, |a, face| a | all(face));
+        // The edges at two opposite corners, and the others.
+        let diagonals = [
+            ([0, 4, 8, 3, 7, 11], [1, 2, 5, 6, 9, 10]),
+            ([1, 5, 8, 2, 6, 11], [0, 3, 4, 7, 9, 10]),
+            ([2, 4, 9, 1, 7, 10], [0, 3, 5, 6, 8, 11]),
+            ([3, 5, 9, 0, 6, 10], [1, 2, 4, 7, 8, 11]),
+        ];
+        diagonals.iter().fold(ambiguous, |a, (at, others)| a | (all(at) & none(others)))
+    }
+
+    /// The corners of a cell that are inside.
+    #[inline]
+    pub(super) fn mask(&self, cell: Local) -> Mask {
+        let [x, y, z] = cell.coords();
+        let bit = 8 * y + z;
+        self.corners.iter().enumerate().fold(0, |mask, (i, plane)| mask | ((plane.0[x as usize] >> bit & 1) as u8) << i)
+    }
+
+    pub(super) fn brick(&self) -> &'a Brick {
+        self.brick
+    }
+}
+
+/// Positions a side of the table: a brick and the next layer.
+const SIDE: usize = 9;
+/// Positions of the table for one axis.
+const LAYER: usize = SIDE * SIDE * SIDE;
+
+/// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale.
+pub(super) struct EdgeTable<T>([Box<[T; LAYER]>; 3]);
+
+/// Where bit b of a plane's word stands in a layer of the table.
+static AT: [u8; 64] = {
+    let mut at = [0; 64];
+    let mut b = 0;
+    while b < 64 {
+        at[b] = ((b >> 3) * SIDE + (b & 7)) as u8;
+        b += 1;
+    }
+    at
+};
+
+impl<T: Copy> EdgeTable<T> {
+    pub(super) fn new(empty: T) -> Self {
+        EdgeTable(std::array::from_fn(|_| Box::new([empty; LAYER])))
+    }
+
+    /// The entry of an edge of a cell of the brick last filled in. The edge must be crossed.
+    #[inline]
+    pub(super) fn get(&self, cell: Local, edge: Edge) -> T {
+        let [x, y, z] = cell.coords().map(|c| c as usize);
+        self.0[edge.index() >> 2][(x * SIDE + y) * SIDE + z + usize::from(EDGE_STEP[edge.index()])]
+    }
+
+    /// Makes an entry for each crossing round the cells of a brick, from its axis and its number.
+    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(usize, u32) -> T) {
+        let mut number = cells.brick.first;
+        for (axis, plane) in cells.brick.crossed.iter().enumerate() {
+            for (x, &word) in plane.0.iter().enumerate() {
+                for b in Bits(word) {
+                    self.0[axis][x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, number);
+                    number += 1;
+                }
+            }
+        }
+        const LOW_Y: u64 = 0xff;
+        const LOW_Z: u64 = 0x0101_0101_0101_0101;
+        let [px, py, pz, pxy, pxz, pyz] = cells.plus;
+        self.fill_layer(px, &[1, 2], [8, 0, 0], !0, &mut entry);
+        self.fill_layer(py, &[0, 2], [0, 8, 0], LOW_Y, &mut entry);
+        self.fill_layer(pz, &[0, 1], [0, 0, 8], LOW_Z, &mut entry);
+        self.fill_layer(pxy, &[2], [8, 8, 0], LOW_Y, &mut entry);
+        self.fill_layer(pxz, &[1], [8, 0, 8], LOW_Z, &mut entry);
+        self.fill_layer(pyz, &[0], [0, 8, 8], LOW_Y & LOW_Z, &mut entry);
+    }
+
+    /// The same for the layer of a neighbouring brick that touches this one: its edges along `axes` at the selected bits.
+    fn fill_layer(
+        &mut self,
+        brick: &Brick,
+        axes: &[usize],
+        [x0, y0, z0]: [usize; 3],
+        select: u64,
+        entry: &mut impl FnMut(usize, u32) -> T,
+    ) {
+        let at = (x0 * SIDE + y0) * SIDE + z0;
+        let words = if x0 == 0 { 8 } else { 1 };
+        let mut number = brick.first;
+        for (axis, plane) in brick.crossed.iter().enumerate() {
+            if axes.contains(&axis) {
+                let mut before = number;
+                for (x, &word) in plane.0[..words].iter().enumerate() {
+                    for b in Bits(word & select) {
+                        let below = (word & ((1 << b) - 1)).count_ones();
+                        self.0[axis][at + x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, before + below);
+                    }
+                    before += word.count_ones();
+                }
+                if axes.last() == Some(&axis) {
+                    break;
+                }
+            }
+            number += plane.count();
+        }
+    }
+}
+
+/// How far the start of each edge of a cell is from the cell's own place in a layer of the table.
+static EDGE_STEP: [u8; 12] = {
+    let mut step = [0; 12];
+    let mut i = 0;
+    while i < 12 {
+        let edge = Edge::ALL[i];
+        let corner = edge.corners()[0];
+        let mut s = 0;
+        if corner.is_high(Axis::X) {
+            s += SIDE * SIDE;
+        }
+        if corner.is_high(Axis::Y) {
+            s += SIDE;
+        }
+        if corner.is_high(Axis::Z) {
+            s += 1;
+        }
+        step[i] = s as u8;
+        i += 1;
+    }
+    step
+};

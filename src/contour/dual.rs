@@ -1,0 +1,542 @@
+//! Dual contouring (Ju, Losasso, Schaefer and Warren 2002) over bricks, manifold for any signs.
+//!
+//! A mixed cell has one vertex for each sheet of the surface in it; each crossed edge becomes a quadrilateral between the vertices
+//! of its four cells. In a few cells ([irregular sheets](crate::grid::cases)) that would glue two places of the surface
+//! together. There the surface of the grid of element centres is used as it is: one vertex for each inside corner, and two more kinds
+//! of polygons, beside an inside edge (across a face that is not inside) and on an inside face. Those collapse in all other cells.
+//!
+//! Vertices are numbered brick by brick, in the order of the cells: a cell's number is the brick's first plus the rank of its bit
+//! in the plane of mixed cells, plus the extra vertices of knotty cells before it, of which there are few and which are listed.
+//!
+//! Cost: about 60 ns and 76/80 bytes a mixed cell beyond the octree (a plane and 12 bytes a brick); positions are not kept.
+
+use super::cells::{Cells, EdgeTable};
+use super::stream::in_order;
+use crate::error::Result;
+use crate::geom::Frame;
+use crate::geom::normal::NormalCode;
+use crate::geom::qef::Qef;
+use crate::grid::brick::{Bits, Local, Plane};
+use crate::grid::cases::{CASES, Mask, inside_end};
+use crate::grid::{Axis, Corner, Edge, Face, Key};
+use crate::mesh::{MeshSink, MeshSizes};
+use crate::octree::SignedOctree;
+use crate::octree::crossings::{Brick, position, toward};
+use crate::progress::{Progress, Stage};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Where the vertices go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Placement {
+    /// At the minimum of the quadratic error function, kept inside the cell: sharp edges and corners are kept. Needs normals.
+    #[default]
+    SharpFeatures,
+    /// At the mean of the crossings of the sheet.
+    MassPoint,
+}
+
+/// How [`dual_contouring`] makes the surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DualOptions {
+    /// Where the vertices go.
+    pub placement: Placement,
+    /// Split quadrilaterals into triangles, along creases where there are any.
+    pub triangles: bool,
+}
+
+/// Passes the surface of the octree to `sink`, as quadrilaterals (and a few triangles) or as triangles; returns its size.
+/// Quadrilaterals begin with a corner of the diagonal by which they are best split.
+///
+/// # Errors
+/// Whatever `sink` returns, and `Cancelled`.
+///
+/// # Panics
+/// When sharp features are asked for and the octree has no normals.
+pub fn dual_contouring(
+    octree: &SignedOctree,
+    frame: &Frame,
+    options: &DualOptions,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
+    let crossings = octree.crossings();
+    assert!(options.placement == Placement::MassPoint || crossings.with_normals() || crossings.is_empty(), "sharp features need normals");
+    let bricks = crossings.bricks().len();
+    progress.begin(Stage::Contour, 2 * bricks as u64);
+    let layout = Layout::new(octree);
+    let polygons = layout.extra_polygons();
+    let (quads, extra_corners) = (crossings.len() as u64, polygons.iter().map(|p| p.1.len() as u64).sum::<u64>());
+    let sizes = if options.triangles {
+        let triangles = 2 * quads + extra_corners - 2 * polygons.len() as u64;
+        MeshSizes { points: layout.vertices, faces: triangles, corners: 3 * triangles }
+    } else {
+        MeshSizes { points: layout.vertices, faces: quads + polygons.len() as u64, corners: 4 * quads + extra_corners }
+    };
+    sink.begin(sizes)?;
+    let mut sharp: Vec<Plane> = Vec::with_capacity(bricks);
+    in_order(
+        bricks,
+        progress,
+        || EdgeTable::new(Tangent::default()),
+        |table, range| layout.place_vertices(frame, options.placement, table, range),
+        |(points, planes)| {
+            sharp.extend(planes);
+            sink.points(&points)
+        },
+    )?;
+    in_order(
+        bricks,
+        progress,
+        || CellTable(Box::new([CellVertices::default(); CELL_SIDE.pow(3)])),
+        |table, range| layout.faces(&sharp, &polygons, options.triangles, table, range),
+        |faces| faces.pass_on(sink),
+    )?;
+    Ok(sizes)
+}
+
+/// A crossing as the cells beside it see it: position along the edge, and unit normal with the component along the edge positive.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tangent {
+    position: f32,
+    normal: [f32; 3],
+}
+
+/// A mixed cell whose vertices are not the ordinary single one.
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    cell: Local,
+    mask: Mask,
+}
+
+/// Which cells have vertices, and which numbers.
+struct Layout<'a> {
+    octree: &'a SignedOctree,
+    bricks: Vec<CellBrick>,
+    knots: Vec<Knot>,
+    vertices: u64,
+}
+
+struct CellBrick {
+    mixed: Plane,
+    /// Number of the first vertex.
+    first: u32,
+    /// Where the brick's knots begin.
+    knots: u32,
+}
+
+impl<'a> Layout<'a> {
+    fn new(octree: &'a SignedOctree) -> Self {
+        let found: Vec<(Plane, Vec<Knot>)> = (0..octree.crossings().bricks().len())
+            .into_par_iter()
+            .map(|i| {
+                let cells = Cells::new(octree, i);
+                let knots = cells.knotty().iter().map(|cell| Knot { cell, mask: cells.mask(cell) });
+                (cells.mixed(), knots.filter(|k| k.extra_vertices() > 0).collect())
+            })
+            .collect();
+        let mut layout = Layout { octree, bricks: Vec::with_capacity(found.len()), knots: Vec::new(), vertices: 0 };
+        for (mixed, knots) in found {
+            let first = u32::try_from(layout.vertices).expect("fewer than 2^32 vertices");
+            layout.vertices += u64::from(mixed.count()) + knots.iter().map(|k| u64::from(k.extra_vertices())).sum::<u64>();
+            layout.bricks.push(CellBrick { mixed, first, knots: layout.knots.len() as u32 });
+            layout.knots.extend(knots);
+        }
+        layout
+    }
+
+    fn knots_of(&self, brick: usize) -> &[Knot] {
+        let end = self.bricks.get(brick + 1).map_or(self.knots.len(), |b| b.knots as usize);
+        &self.knots[self.bricks[brick].knots as usize..end]
+    }
+
+    /// Calls `each` with the mixed cells of a brick that `select` leaves of each word, their first vertices and their masks (0 if
+    /// ordinary).
+    #[inline]
+    fn for_cells(&self, brick: usize, select: impl Fn(usize) -> u64, mut each: impl FnMut(Local, u32, Mask)) {
+        let CellBrick { mixed, first, .. } = &self.bricks[brick];
+        let mut before = *first;
+        let mut knots = self.knots_of(brick).iter().peekable();
+        for (x, &word) in mixed.0.iter().enumerate() {
+            let selected = select(x);
+            if selected != 0 {
+                for b in Bits(word & selected) {
+                    let cell = Local::from_index(x as u32 * 64 + b);
+                    while let Some(knot) = knots.next_if(|k| k.cell < cell) {
+                        before += knot.extra_vertices();
+                    }
+                    let below = (word & ((1 << b) - 1)).count_ones();
+                    let mask = knots.peek().filter(|k| k.cell == cell).map_or(0, |k| k.mask);
+                    each(cell, before + below, mask);
+                }
+            }
+            before += word.count_ones();
+        }
+    }
+
+    /// The vertex of the cell at `at` to which its inside corner `corner` belongs.
+    fn vertex(&self, at: [u32; 3], corner: Corner) -> u32 {
+        let crossings = self.octree.crossings();
+        let key = Key::cell(crossings.depth() - 3, at.map(|c| c >> 3)).expect("cells lie in the root cube");
+        let brick = crossings.find(key).expect("mixed cells belong to listed bricks");
+        let cell = Local::new(at[0], at[1], at[2]);
+        let extra: u32 = self.knots_of(brick).iter().filter(|k| k.cell < cell).map(|k| k.extra_vertices()).sum();
+        let CellBrick { mixed, first, .. } = &self.bricks[brick];
+        let slot = self.knots_of(brick).iter().find(|k| k.cell == cell).map_or(0, |k| k.slot(corner));
+        first + mixed.rank(cell) + extra + slot
+    }
+
+    /// The polygons beside inside edges and on inside faces of irregular cells, each with its brick.
+    fn extra_polygons(&self) -> Vec<(usize, Vec<u32>)> {
+        let mut polygons = Vec::new();
+        for (i, brick) in self.octree.crossings().bricks().iter().enumerate() {
+            let origin = self.octree.crossings().origin(brick);
+            for knot in self.knots_of(i).iter().filter(|k| !CASES[usize::from(k.mask)].sheets.all_regular()) {
+                let c = knot.cell.coords();
+                let at = std::array::from_fn(|a| origin[a] + c[a]);
+                polygons.extend(self.polygons_of_knot(at, knot.mask).into_iter().map(|p| (i, p)));
+            }
+        }
+        polygons
+    }
+
+    fn polygons_of_knot(&self, at: [u32; 3], mask: Mask) -> Vec<Vec<u32>> {
+        let sheets = &CASES[usize::from(mask)].sheets;
+        let irregular = |c: Corner| mask >> c.index() & 1 == 1 && !sheets.is_regular(sheets.sheet[c.index()]);
+        let face_is_inside = |face: Face| face.corners().iter().all(|c| mask >> c.index() & 1 == 1);
+        let mut polygons = Vec::new();
+        for edge in Edge::ALL {
+            let [p, q] = edge.corners();
+            if !(irregular(p) && irregular(q)) {
+                continue;
+            }
+            for face in edge.faces().into_iter().filter(|&f| !face_is_inside(f)) {
+                // The cell across the face sees the two corners on its other side.
+                let mut beyond = at;
+                let a = face.axis().index();
+                beyond[a] = if face.is_high() { at[a] + 1 } else { at[a] - 1 };
+                let (p2, q2) = (p ^ face.axis(), q ^ face.axis());
+                let (vp, vq) = (self.vertex(beyond, p2), self.vertex(beyond, q2));
+                // If it is irregular as well, it finds the same polygon.
+                if vp != vq && !face.is_high() {
+                    continue;
+                }
+                let corners = [(at, p), (at, q), (beyond, q2), (beyond, p2)];
+                // The solid ends at the edge: outward is into the face.
+                let outward = middle(&face.corners().map(|c| point(at, c))) - middle(&[point(at, p), point(at, q)]);
+                let mut polygon = self.oriented(&corners, outward);
+                polygon.dedup();
+                if polygon.first() == polygon.last() {
+                    polygon.pop();
+                }
+                polygons.push(polygon);
+            }
+        }
+        for face in Face::ALL.into_iter().filter(|&f| face_is_inside(f) && irregular(f.corners()[0])) {
+            let ring = ring_of(face);
+            let corners = ring.map(|c| (at, c));
+            let outward = centre(at) - middle(&ring.map(|c| point(at, c)));
+            polygons.push(self.oriented(&corners, outward));
+        }
+        polygons
+    }
+
+    /// The vertices of a polygon, in the order in which its normal points outward. Vertices are taken to lie half way between their
+    /// corner and the centre of their cell.
+    fn oriented(&self, corners: &[([u32; 3], Corner); 4], outward: DVec3) -> Vec<u32> {
+        let p = corners.map(|(at, c)| middle(&[point(at, c), centre(at)]));
+        let normal = (p[2] - p[0]).cross(p[3] - p[1]);
+        let mut polygon: Vec<u32> = corners.iter().map(|&(at, c)| self.vertex(at, c)).collect();
+        if normal.dot(outward) < 0.0 {
+            polygon.reverse();
+        }
+        polygon
+    }
+
+    /// The points of the vertices of some bricks, and the planes of their cells with sharp features.
+    fn place_vertices(
+        &self,
+        frame: &Frame,
+        placement: Placement,
+        table: &mut EdgeTable<Tangent>,
+        range: Range<usize>,
+    ) -> (Vec<DVec3>, Vec<Plane>) {
+        let crossings = self.octree.crossings();
+        let first = self.bricks[range.start].first;
+        let end = self.bricks.get(range.end).map_or(self.vertices, |b| u64::from(b.first));
+        let mut points = Vec::with_capacity((end - u64::from(first)) as usize);
+        let mut planes = Vec::with_capacity(range.len());
+        for i in range {
+            let cells = Cells::new(self.octree, i);
+            table.fill(&cells, |axis, number| Tangent {
+                position: position(crossings.offsets()[number as usize]) as f32,
+                normal: match placement {
+                    Placement::SharpFeatures => tangent_normal(axis, crossings.normals()[number as usize]),
+                    Placement::MassPoint => [0.0; 3],
+                },
+            });
+            let origin = DVec3::from(crossings.origin(cells.brick()).map(f64::from));
+            let mut sharp = Plane::EMPTY;
+            for cell in cells.mixed().iter() {
+                let corner = origin + DVec3::from(cell.coords().map(f64::from));
+                let mask = cells.mask(cell);
+                let tangents = |edge: Edge| table.get(cell, edge);
+                let is_sharp = place_in_cell(mask, placement, tangents, |p| points.push(frame.to_model(corner + p)));
+                if is_sharp {
+                    sharp.set(cell);
+                }
+            }
+            planes.push(sharp);
+        }
+        (points, planes)
+    }
+
+    fn faces(
+        &self,
+        sharp: &[Plane],
+        extra: &[(usize, Vec<u32>)],
+        triangles: bool,
+        table: &mut CellTable,
+        range: Range<usize>,
+    ) -> Faces {
+        let bricks = &self.octree.crossings().bricks()[range.clone()];
+        let quads = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
+        let mut faces = Faces { triangles, corners: Vec::with_capacity(quads * if triangles { 6 } else { 4 }), others: Vec::new() };
+        let from = extra.partition_point(|(brick, _)| *brick < range.start);
+        let extra = extra[from..].iter().take_while(|(brick, _)| *brick < range.end);
+        for i in range {
+            table.fill(self, sharp, i);
+            table.quads(&self.octree.crossings().bricks()[i], &self.octree.inside()[i], &mut faces);
+        }
+        extra.for_each(|(_, polygon)| faces.polygon(polygon));
+        faces
+    }
+}
+
+impl Knot {
+    /// Vertices beyond the first.
+    fn extra_vertices(self) -> u32 {
+        u32::from(CASES[usize::from(self.mask)].sheets.vertices) - 1
+    }
+
+    fn slot(self, corner: Corner) -> u32 {
+        slot(self.mask, corner)
+    }
+}
+
+/// Which of the cell's vertices an inside corner belongs to.
+#[inline]
+fn slot(mask: Mask, corner: Corner) -> u32 {
+    u32::from(CASES[usize::from(mask)].sheets.vertex[corner.index()])
+}
+
+/// The corners of a face in cyclic order.
+fn ring_of(face: Face) -> [Corner; 4] {
+    let [u, v] = face.axis().others();
+    let base = if face.is_high() { Corner::MIN | face.axis() } else { Corner::MIN };
+    [base, base | u, base | u | v, base | v]
+}
+
+fn point(cell: [u32; 3], corner: Corner) -> DVec3 {
+    DVec3::from(Axis::ALL.map(|a| f64::from(cell[a.index()] + u32::from(corner & a))))
+}
+
+fn centre(cell: [u32; 3]) -> DVec3 {
+    DVec3::from(cell.map(|c| f64::from(c) + 0.5))
+}
+
+fn middle(points: &[DVec3]) -> DVec3 {
+    points.iter().sum::<DVec3>() / points.len() as f64
+}
+
+/// The stored normal as x, y, z.
+#[inline]
+fn tangent_normal(axis: usize, code: u16) -> [f32; 3] {
+    let [u, v, w] = NormalCode(code).decode().map(|c| c as f32);
+    match axis {
+        0 => [w, u, v],
+        1 => [u, w, v],
+        _ => [u, v, w],
+    }
+}
+
+/// Vertices keep this distance from the sides of their cell, in cells.
+const CELL_MARGIN: f64 = 1.0 / 1024.0;
+
+/// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
+const CREASED: f64 = 0.933;
+
+/// Calls `place` with the vertices of a cell, in cells from its least corner. Returns whether the cell has a crease or corner.
+#[inline]
+fn place_in_cell(
+    mask: Mask,
+    placement: Placement,
+    tangent: impl Fn(Edge) -> Tangent,
+    mut place: impl FnMut(DVec3),
+) -> bool {
+    let case = &CASES[usize::from(mask)];
+    let crossing = |edge: Edge| {
+        let start = edge.corners()[0];
+        let t = tangent(edge);
+        let mut p = Axis::ALL.map(|a| f64::from(u8::from(start & a)));
+        p[edge.axis().index()] = f64::from(t.position);
+        let n = DVec3::from(t.normal.map(f64::from));
+        // Outward: from the inside end to the other.
+        (DVec3::from(p), if mask >> start.index() & 1 == 1 { n } else { -n })
+    };
+    let solve = |qef: &Qef| {
+        let p = match placement {
+            Placement::SharpFeatures => qef.minimiser(),
+            Placement::MassPoint => qef.mass_point(),
+        };
+        p.clamp(DVec3::splat(CELL_MARGIN), DVec3::splat(1.0 - CELL_MARGIN))
+    };
+    let creased = |qef: &Qef| placement == Placement::SharpFeatures && qef.flatness() < CREASED;
+    if let ([cycle], true) = (&case.cycles[..], case.sheets.vertices == 1) {
+        let mut qef = Qef::default();
+        cycle.iter().for_each(|&edge| {
+            let (p, n) = crossing(edge);
+            qef.add(p, n);
+        });
+        place(solve(&qef));
+        return creased(&qef);
+    }
+    let mut sharp = false;
+    for sheet in 0..case.sheets.count {
+        let mut qef = Qef::default();
+        let of_sheet = || {
+            let sheet_of = |edge| case.sheets.sheet[inside_end(mask, edge).index()];
+            case.cycles.iter().flatten().copied().filter(move |&edge| sheet_of(edge) == sheet)
+        };
+        of_sheet().map(&crossing).for_each(|(p, n)| qef.add(p, n));
+        let common = solve(&qef);
+        sharp |= creased(&qef);
+        if case.sheets.is_regular(sheet) {
+            place(common);
+            continue;
+        }
+        // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.
+        for corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
+            let around: Vec<DVec3> = of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| crossing(e).0).collect();
+            let own = if around.is_empty() { middle(&[point([0; 3], corner), DVec3::splat(0.5)]) } else { middle(&around) };
+            place(own.lerp(common, 0.25));
+        }
+    }
+    sharp
+}
+
+/// Cells a side of the table: a brick and the layer before it.
+const CELL_SIDE: usize = 9;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct CellVertices {
+    first: u32,
+    /// 0 for a cell with a single vertex.
+    mask: Mask,
+    sharp: bool,
+}
+
+/// The vertices of the cells of a brick and of those before it in x, y and z. Entries of other cells are stale.
+struct CellTable(Box<[CellVertices; CELL_SIDE.pow(3)]>);
+
+impl CellTable {
+    fn fill(&mut self, layout: &Layout<'_>, sharp: &[Plane], brick: usize) {
+        const LAST_Y: u64 = 0xff << 56;
+        const LAST_Z: u64 = 0x8080_8080_8080_8080;
+        let crossings = layout.octree.crossings();
+        for (steps, bits) in [
+            ([0, 0, 0], !0),
+            ([-1, 0, 0], !0),
+            ([0, -1, 0], LAST_Y),
+            ([0, 0, -1], LAST_Z),
+            ([-1, -1, 0], LAST_Y),
+            ([-1, 0, -1], LAST_Z),
+            ([0, -1, -1], LAST_Y & LAST_Z),
+        ] {
+            let found = if steps == [0; 3] {
+                Some(brick)
+            } else {
+                crossings.bricks()[brick].key.toward(toward(steps)).and_then(|key| crossings.find(key))
+            };
+            let Some(found) = found else { continue };
+            let select = |x: usize| if steps[0] == 0 || x == 7 { bits } else { 0 };
+            layout.for_cells(found, select, |cell, first, mask| {
+                let c = cell.coords();
+                // 1 is the brick's own first cell; a neighbour's last cell comes to stand at 0.
+                let [x, y, z] = std::array::from_fn(|a| (c[a] as i32 + 1 + 8 * steps[a]) as usize);
+                let sharp = sharp[found].get(cell);
+                self.0[(x * CELL_SIDE + y) * CELL_SIDE + z] = CellVertices { first, mask, sharp };
+            });
+        }
+    }
+
+    /// One quadrilateral for each crossed edge of the brick.
+    fn quads(&self, brick: &Brick, inside: &Plane, faces: &mut Faces) {
+        const STEP: [usize; 3] = [CELL_SIDE * CELL_SIDE, CELL_SIDE, 1];
+        for axis in Axis::ALL {
+            let [u, v] = axis.others();
+            let (su, sv) = (STEP[u.index()], STEP[v.index()]);
+            // The four cells round the edge, counter-clockwise in (u, v), and the corner of each at the edge's start.
+            let round = [(su + sv, Corner::MIN | u | v), (sv, Corner::MIN | v), (0, Corner::MIN), (su, Corner::MIN | u)];
+            // u x v points along the axis, but for y.
+            let forward = axis != Axis::Y;
+            for edge in brick.crossed[axis.index()].iter() {
+                let [x, y, z] = edge.coords().map(|c| c as usize + 1);
+                let at = (x * CELL_SIDE + y) * CELL_SIDE + z;
+                let starts_inside = inside.get(edge);
+                let cells = round.map(|(step, _)| &self.0[at - step]);
+                let mut quad: [u32; 4] = std::array::from_fn(|i| {
+                    let CellVertices { first, mask, .. } = *cells[i];
+                    if mask == 0 {
+                        first
+                    } else {
+                        let start = round[i].1;
+                        first + slot(mask, if starts_inside { start } else { start | axis })
+                    }
+                });
+                // The diagonal joins the vertices of a crease.
+                if cells[1].sharp && cells[3].sharp && !(cells[0].sharp && cells[2].sharp) {
+                    quad.rotate_left(1);
+                }
+                if starts_inside != forward {
+                    quad.swap(1, 3);
+                }
+                faces.quad(quad);
+            }
+        }
+    }
+}
+
+/// Faces of some bricks.
+struct Faces {
+    triangles: bool,
+    /// Corners of quadrilaterals, or of triangles.
+    corners: Vec<u32>,
+    /// Polygons that are not quadrilaterals.
+    others: Vec<Vec<u32>>,
+}
+
+impl Faces {
+    #[inline]
+    fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
+        if self.triangles {
+            self.corners.extend([a, b, c, a, c, d]);
+        } else {
+            self.corners.extend([a, b, c, d]);
+        }
+    }
+
+    fn polygon(&mut self, polygon: &[u32]) {
+        match *polygon {
+            [a, b, c, d] => self.quad([a, b, c, d]),
+            [a, b, c] if self.triangles => self.corners.extend([a, b, c]),
+            _ => self.others.push(polygon.to_vec()),
+        }
+    }
+
+    fn pass_on(self, sink: &mut dyn MeshSink) -> Result<()> {
+        sink.faces(if self.triangles { 3 } else { 4 }, &self.corners)?;
+        self.others.iter().try_for_each(|polygon| sink.faces(polygon.len(), polygon))
+    }
+}

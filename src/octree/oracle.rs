@@ -1,0 +1,78 @@
+//! The obvious twin of the octree for tests: a list of boxes, all of which are looked at for every question.
+
+use proptest::prelude::*;
+
+use super::LinearOctree;
+use crate::grid::key::SIDE;
+use crate::grid::{Direction, Key};
+
+/// Up to so many lattice points.
+pub(super) fn points(max: usize) -> impl Strategy<Value = Vec<[u32; 3]>> {
+    prop::collection::vec([0..=SIDE, 0..=SIDE, 0..=SIDE], 0..=max)
+}
+
+/// Trees with leaves of levels up to `depth`: the root, split around random points to random levels, with random leaves missing.
+/// The record of each leaf is the bits of its key.
+pub(super) fn tree(depth: u32) -> impl Strategy<Value = LinearOctree<u64>> {
+    let splits = prop::collection::vec(([0..SIDE, 0..SIDE, 0..SIDE], 1..=depth), 0..6);
+    (splits, prop::collection::vec(any::<prop::sample::Index>(), 0..8)).prop_map(|(splits, missing)| {
+        let mut tree = LinearOctree::from_iter([(Key::ROOT, Key::ROOT.to_bits())]);
+        for (point, level) in splits {
+            while let Some((leaf, _)) = tree.locate(point).filter(|(leaf, _)| leaf.level() < Some(level)) {
+                tree.remove(leaf);
+                tree.extend(leaf.children().map(|child| (child, child.to_bits())));
+            }
+        }
+        let keys = tree.keys_z();
+        for index in missing {
+            tree.remove(keys[index.index(keys.len())]);
+        }
+        tree
+    })
+}
+
+/// Least and greatest coordinates.
+type Span = ([u32; 3], [u32; 3]);
+
+/// All leaves in Z-order with their boxes.
+pub(super) struct Oracle(Vec<(Key, Span)>);
+
+impl Oracle {
+    pub(super) fn new<T>(tree: &LinearOctree<T>) -> Self {
+        Oracle(tree.keys_z().into_iter().map(|leaf| (leaf, span(leaf))).collect())
+    }
+
+    /// The leaf that holds a point on its low faces or inside, or on the root's high faces.
+    pub(super) fn leaf_at(&self, point: [u32; 3]) -> Option<Key> {
+        let holds = |&&(_, (min, max)): &&(Key, Span)| {
+            (0..3).all(|i| min[i] <= point[i] && (point[i] < max[i] || point[i] == SIDE && max[i] == SIDE))
+        };
+        self.0.iter().find(holds).map(|&(leaf, _)| leaf)
+    }
+
+    /// The leaves that overlap the same-sized neighbour and touch what it shares with the cell.
+    pub(super) fn neighbours(&self, cell: Key, direction: Direction) -> Vec<Key> {
+        let Some(beyond) = cell.toward(direction).map(span) else { return Vec::new() };
+        let shared = meet(span(cell), beyond);
+        let touches = |b: Span| meets(meet(b, shared)) && (0..3).all(|i| meet(b, beyond).0[i] < meet(b, beyond).1[i]);
+        self.0.iter().filter(|&&(_, b)| touches(b)).map(|&(leaf, _)| leaf).collect()
+    }
+
+    /// The other leaves that touch this one.
+    pub(super) fn touching(&self, leaf: Key) -> impl Iterator<Item = Key> {
+        self.0.iter().filter(move |&&(k, b)| k != leaf && meets(meet(b, span(leaf)))).map(|&(k, _)| k)
+    }
+}
+
+fn span(leaf: Key) -> Span {
+    (leaf.min_corner(), leaf.max_corner())
+}
+
+fn meet(a: Span, b: Span) -> Span {
+    let axes = [0, 1, 2];
+    (axes.map(|i| a.0[i].max(b.0[i])), axes.map(|i| a.1[i].min(b.1[i])))
+}
+
+fn meets((min, max): Span) -> bool {
+    (0..3).all(|i| min[i] <= max[i])
+}
