@@ -132,7 +132,8 @@ impl<'a> Layout<'a> {
             .into_par_iter()
             .map(|i| {
                 let cells = Cells::new(octree, i);
-                let knots = cells.knotty().iter().map(|cell| Knot { cell, mask: cells.mask(cell) });
+                let knotty = cells.knotty();
+                let knots = knotty.iter().map(|cell| Knot { cell, mask: cells.mask(cell) });
                 (cells.mixed(), knots.filter(|k| k.extra_vertices() > 0).collect())
             })
             .collect();
@@ -305,7 +306,7 @@ impl<'a> Layout<'a> {
         let mut faces = Faces { triangles, corners: Vec::with_capacity(quads * if triangles { 6 } else { 4 }), others: Vec::new() };
         let from = extra.partition_point(|(brick, _)| *brick < range.start);
         let extra = extra[from..].iter().take_while(|(brick, _)| *brick < range.end);
-        for i in range {
+        for i in range.clone() {
             table.fill(self, sharp, i);
             table.quads(&self.octree.crossings().bricks()[i], &self.octree.inside()[i], &mut faces);
         }
