@@ -1,7 +1,9 @@
 //! Indexed polygons, and what can be said about them.
 
+mod polygon;
 mod stream;
 
+pub use polygon::triangulate;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
 
 use glam::DVec3;
