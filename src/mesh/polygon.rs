@@ -6,11 +6,10 @@
 //! polygon gets one without overlaps; a hopeless one gets some.
 
 use glam::{DVec2, DVec3};
-use std::collections::VecDeque;
 
 /// Visits of blocking corners and tests of ears granted to a polygon, plus [`WORK_PER_CORNER`] each: about 0.1 s.
 const WORK: u64 = 1 << 24;
-/// A comb of 100,000 corners needs 12 visits a corner; only tangles need more than this.
+/// A comb of 100,000 corners takes 8 a corner; tangles run into this bound.
 const WORK_PER_CORNER: u64 = 256;
 
 /// Appends triangles that cover the polygon with the given corners (indices into `points`), oriented as it is.
@@ -113,28 +112,36 @@ impl<'a> Ears<'a> {
         self.drop_void_corners();
         let reflex = self.ring().filter(|&i| self.turn_at(i) <= 0.0 && self.flat[i as usize].is_finite()).collect();
         self.blockers = Buckets::new(reflex, &self.flat);
-        // Candidates wait in a queue; cutting an ear sends its neighbours to the end, so that triangles stay plump.
-        // A corner's ticket tells its last entry in the queue from stale ones.
-        let mut tickets = vec![0u32; self.next.len()];
-        let mut queue: VecDeque<(u32, u32)> = self.ring().map(|i| (i, 0)).collect();
-        let mut greed = 0;
+        // Cutting an ear makes its neighbours wait for the next round, so that triangles stay plump; every other round runs
+        // backwards, lest long strips become fans.
+        let mut waiting: Vec<u32> = self.ring().collect();
+        let mut candidates = Vec::new();
+        let mut last_wait = vec![0u32; self.next.len()];
+        let (mut round, mut greed) = (0, 0);
         while self.left > 3 {
-            let Some((at, ticket)) = queue.pop_front() else {
-                // A full round without an ear: not a simple polygon. Be content with less, for one triangle.
+            round += 1;
+            if waiting.is_empty() {
+                // No ear left: not a simple polygon. Be content with less, for one triangle.
                 greed += 1;
+                waiting.extend(self.ring());
                 self.work = self.work.saturating_sub(self.next.len() as u64);
-                queue.extend(self.ring().map(|i| (i, tickets[i as usize])));
-                continue;
-            };
-            if self.next[at as usize] == GONE || tickets[at as usize] != ticket || !self.may_cut(at, greed) {
-                continue;
             }
-            greed = 0;
-            for i in [self.prev[at as usize], self.next[at as usize]] {
-                tickets[i as usize] += 1;
-                queue.push_back((i, tickets[i as usize]));
+            std::mem::swap(&mut candidates, &mut waiting);
+            if round % 2 == 0 {
+                candidates.reverse();
             }
-            self.cut(at);
+            for at in candidates.drain(..) {
+                if self.left > 3 && last_wait[at as usize] != round && self.may_cut(at, greed) {
+                    greed = 0;
+                    for i in [self.prev[at as usize], self.next[at as usize]] {
+                        if last_wait[i as usize] != round {
+                            last_wait[i as usize] = round;
+                            waiting.push(i);
+                        }
+                    }
+                    self.cut(at);
+                }
+            }
         }
         let last = self.ring().next().expect("three corners are left");
         self.out.push(self.triangle(last));
@@ -218,13 +225,13 @@ impl<'a> Ears<'a> {
     }
 }
 
-/// A square grid over some corners, about one of them a cell.
+/// A grid of square cells over some corners, about as many cells as corners.
 #[derive(Default)]
 struct Buckets {
     min: DVec2,
     cells_per_unit: DVec2,
-    /// Cells along a side; 0 when there are no corners.
-    side: usize,
+    /// Cells in each direction; 0 when there are no corners.
+    cells: [usize; 2],
     /// Where each cell's corners end in `corners`.
     ends: Vec<u32>,
     corners: Vec<u32>,
@@ -235,16 +242,20 @@ impl Buckets {
         if corners.is_empty() {
             return Buckets::default();
         }
-        let side = corners.len().isqrt();
         let at = |i: &u32| flat[*i as usize];
         let min = corners.iter().map(at).fold(DVec2::INFINITY, DVec2::min);
         let max = corners.iter().map(at).fold(DVec2::NEG_INFINITY, DVec2::max);
-        let cells_per_unit = side as f64 / (max - min).max(DVec2::splat(f64::MIN_POSITIVE));
-        let mut grid = Buckets { min, cells_per_unit, side, ends: vec![0; side * side], corners: Vec::new() };
+        let extent = (max - min).max(DVec2::splat(f64::MIN_POSITIVE));
+        let count = corners.len() as f64;
+        let across = |ratio: f64| (count * ratio).sqrt().clamp(1.0, count) as usize;
+        let cells = [across(extent.x / extent.y), across(extent.y / extent.x)];
+        let cells_per_unit = DVec2::from_array(cells.map(|n| n as f64)) / extent;
+        let ends = vec![0; cells[0] * cells[1]];
+        let mut grid = Buckets { min, cells_per_unit, cells, ends, corners: Vec::new() };
         corners.sort_by_cached_key(|i| grid.cell(at(i)));
         for i in &corners {
             let [x, y] = grid.cell(at(i));
-            grid.ends[x * side + y] += 1;
+            grid.ends[x * cells[1] + y] += 1;
         }
         let mut total = 0;
         for end in &mut grid.ends {
@@ -257,18 +268,18 @@ impl Buckets {
 
     fn cell(&self, p: DVec2) -> [usize; 2] {
         let cell = (p - self.min) * self.cells_per_unit;
-        [cell.x, cell.y].map(|x| (x as usize).min(self.side - 1))
+        [(cell.x as usize).min(self.cells[0] - 1), (cell.y as usize).min(self.cells[1] - 1)]
     }
 
     /// Whether a corner in the cells that a box touches passes the test; adds what was looked at to `visits`.
     fn any_within(&self, min: DVec2, max: DVec2, visits: &mut u64, test: impl Fn(u32) -> bool) -> bool {
-        if self.side == 0 {
+        if self.corners.is_empty() {
             return false;
         }
         let ([x0, y0], [x1, y1]) = (self.cell(min), self.cell(max));
         (x0..=x1).any(|x| {
             // The cells of a column lie one after another.
-            let (first, last) = (x * self.side + y0, x * self.side + y1);
+            let (first, last) = (x * self.cells[1] + y0, x * self.cells[1] + y1);
             let start = if first == 0 { 0 } else { self.ends[first - 1] };
             let column = &self.corners[start as usize..self.ends[last] as usize];
             *visits += 1 + column.len() as u64;
