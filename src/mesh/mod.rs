@@ -2,6 +2,7 @@
 
 mod polygon;
 mod report;
+pub mod sample;
 mod sets;
 mod star;
 mod stream;
