@@ -239,7 +239,7 @@ fn nan(detail: u32) -> Mesh {
     mesh.points[n / 2].z = f64::INFINITY;
     mesh.points[2 * n / 3].x = f64::NAN;
     let loose = n as u32;
-    mesh.points.extend([0.0, 0.25, 1.0].map(|t| DVec3::splat(2.0 * t - 1.0)));
+    mesh.points.extend([-0.5, 0.0, 0.25].map(DVec3::splat));
     mesh.faces.push(&[loose, loose + 1, loose + 2]);
     for face in [&[0u32, 0, 1][..], &[5, 5, 5], &[7, 8], &[9]] {
         mesh.faces.push(face);
