@@ -9,6 +9,8 @@ pub mod io;
 pub mod mesh;
 pub mod octree;
 pub mod progress;
+#[cfg(feature = "render")]
+pub mod render;
 pub mod repair;
 pub mod sign;
 

@@ -1,8 +1,17 @@
 //! Indexed polygons, and what can be said about them.
 
+mod polygon;
+mod report;
+pub mod sample;
+mod sets;
+mod star;
 mod stream;
+mod validate;
 
+pub use polygon::triangulate;
+pub use report::Report;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
+pub use validate::Violation;
 
 use glam::DVec3;
 
