@@ -23,7 +23,7 @@ use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
 use crate::octree::crossings::{Brick, position, toward};
 use crate::progress::{Progress, Stage};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -100,7 +100,7 @@ pub fn dual_contouring(
 #[derive(Debug, Clone, Copy, Default)]
 struct Tangent {
     position: f32,
-    normal: [f32; 3],
+    normal: Vec3,
 }
 
 /// A mixed cell whose vertices are not the ordinary single one.
@@ -273,8 +273,8 @@ impl<'a> Layout<'a> {
             table.fill(&cells, |axis, number| Tangent {
                 position: position(crossings.offsets()[number as usize]) as f32,
                 normal: match placement {
-                    Placement::SharpFeatures => tangent_normal(axis, crossings.normals()[number as usize]),
-                    Placement::MassPoint => [0.0; 3],
+                    Placement::SharpFeatures => NormalCode(crossings.normals()[number as usize]).decode(Axis::ALL[axis]).as_vec3(),
+                    Placement::MassPoint => Vec3::ZERO,
                 },
             });
             let origin = DVec3::from(crossings.origin(cells.brick()).map(f64::from));
@@ -351,17 +351,6 @@ fn middle(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len() as f64
 }
 
-/// The stored normal as x, y, z.
-#[inline]
-fn tangent_normal(axis: usize, code: u16) -> [f32; 3] {
-    let [u, v, w] = NormalCode(code).decode().map(|c| c as f32);
-    match axis {
-        0 => [w, u, v],
-        1 => [u, w, v],
-        _ => [u, v, w],
-    }
-}
-
 /// Vertices keep this distance from the sides of their cell, in cells.
 const CELL_MARGIN: f64 = 1.0 / 1024.0;
 
@@ -382,7 +371,7 @@ fn place_in_cell(
         let t = tangent(edge);
         let mut p = Axis::ALL.map(|a| f64::from(u8::from(start & a)));
         p[edge.axis().index()] = f64::from(t.position);
-        let n = DVec3::from(t.normal.map(f64::from));
+        let n = t.normal.as_dvec3();
         // Outward: from the inside end to the other.
         (DVec3::from(p), if mask >> start.index() & 1 == 1 { n } else { -n })
     };
@@ -480,8 +469,6 @@ impl CellTable {
             let (su, sv) = (STEP[u.index()], STEP[v.index()]);
             // The four cells round the edge, counter-clockwise in (u, v), and the corner of each at the edge's start.
             let round = [(su + sv, Corner::MIN | u | v), (sv, Corner::MIN | v), (0, Corner::MIN), (su, Corner::MIN | u)];
-            // u x v points along the axis, but for y.
-            let forward = axis != Axis::Y;
             for edge in brick.crossed[axis.index()].iter() {
                 let [x, y, z] = edge.coords().map(|c| c as usize + 1);
                 let at = (x * CELL_SIDE + y) * CELL_SIDE + z;
@@ -500,7 +487,7 @@ impl CellTable {
                 if cells[1].sharp && cells[3].sharp && !(cells[0].sharp && cells[2].sharp) {
                     quad.rotate_left(1);
                 }
-                if starts_inside != forward {
+                if !starts_inside {
                     quad.swap(1, 3);
                 }
                 faces.quad(quad);

@@ -79,8 +79,8 @@ mod tests {
     fn check(octree: &SignedOctree) -> Vec<Mesh> {
         assert_eq!(octree.validate(), Ok(()));
         let surfaces = surfaces(octree);
-        for mesh in &surfaces {
-            assert_eq!(mesh.validate(), Ok(()));
+        for (i, mesh) in surfaces.iter().enumerate() {
+            assert_eq!(mesh.validate(), Ok(()), "surface {i}");
         }
         surfaces
     }

@@ -31,8 +31,7 @@ pub type FineTriangle = [[i32; 3]; 3];
 
 /// Receives what [`rasterise`] finds.
 pub trait Hits {
-    /// The triangle's plane crosses lines along `axis` at the hits that follow; `normal` is the plane's normal (not
-    /// normalised), as components along the other two axes in order and along `axis` itself.
+    /// The triangle's plane, with this normal (x, y, z; of any length), crosses lines along `axis` at the hits that follow.
     fn plane(&mut self, axis: Axis, normal: [f64; 3]);
 
     /// The lattice edge that starts at lattice point `at` and runs one cell along `axis` is crossed, `offset` 65536ths of a
@@ -136,7 +135,13 @@ impl Projection {
                 continue;
             }
             if !announced {
-                hits.plane(axis, self.normal.map(|c| c as f64));
+                let [u, v, w] = self.normal.map(|c| c as f64);
+                let normal = match axis {
+                    Axis::X => [w, u, v],
+                    Axis::Y => [u, w, v],
+                    Axis::Z => [u, v, w],
+                };
+                hits.plane(axis, normal);
                 announced = true;
             }
             let mut fixed = depth.row(row).wrapping_add(first.wrapping_mul(depth.du));

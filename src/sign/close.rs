@@ -236,12 +236,14 @@ impl Patch {
 
     fn switch(&mut self, at: [u32; 3], axis: Axis, position: f64) {
         let edge = finest_element(self.depth, at, Extent::from(axis));
-        let [u, v] = axis.others().map(|a| self.normal[a.index()]);
-        // An edge in the patch's own plane is not crossed by it in earnest: the line runs askew. Any slope will do there.
-        let w = self.normal[axis.index()];
-        let least = 1e-3 * self.normal.length();
-        let w = if w.abs() > least { w } else { least.copysign(w) };
-        let normal = if w == 0.0 { NormalCode::encode(0.0, 0.0, 1.0) } else { NormalCode::encode(u, v, w) };
+        // Where the line runs askew, it crosses edges in the plane of the hole itself: any slope will do there.
+        let mut normal = self.normal;
+        let least = 1e-3 * normal.length();
+        let w = &mut normal[axis.index()];
+        if w.abs() <= least {
+            *w = if least > 0.0 { least.copysign(*w) } else { 1.0 };
+        }
+        let normal = NormalCode::encode(axis, normal.to_array());
         let sample = Sample { offset: (position * 65536.0) as u16, normal: normal.0 };
         self.toggles.push(Toggle { edge, sample });
     }

@@ -160,7 +160,7 @@ impl HitSorter {
 impl Hits for HitSorter {
     #[inline]
     fn plane(&mut self, axis: Axis, normal: [f64; 3]) {
-        let code = if self.with_normals { NormalCode::encode(normal[0], normal[1], normal[2]) } else { NormalCode(0) };
+        let code = if self.with_normals { NormalCode::encode(axis, normal) } else { NormalCode(0) };
         self.plane = (axis.index() as u64) << 41 | u64::from(code.0);
     }
 
@@ -222,7 +222,7 @@ mod tests {
     fn slots_are_taken_apart_again() {
         let mut sorter = HitSorter::new(true);
         let at = [64 + 8 * 5 + 3, 8 * 2 + 7, 128 + 8 * 7 + 1];
-        sorter.plane(Axis::Y, [0.0, 0.0, 2.0]);
+        sorter.plane(Axis::Y, [0.0, 2.0, 0.0]);
         sorter.hit(Axis::Y, at, 999);
         let (block, bucket) = sorter.into_buckets().pop().unwrap();
         assert_eq!(block, [1, 0, 2]);
@@ -230,7 +230,7 @@ mod tests {
         bucket.drain_into(&mut hits);
         assert_eq!(brick_coords(hits[0].brick()), [5, 2, 7]);
         assert_eq!((hits[0].local(), hits[0].axis(), hits[0].offset()), (64 * 3 + 8 * 7 + 1, 1, 999));
-        assert_eq!(hits[0].normal().decode(), [0.0, 0.0, 1.0]);
+        assert_eq!(hits[0].normal().decode(Axis::Y), glam::DVec3::Y);
     }
 
     #[test]
