@@ -1,7 +1,11 @@
 //! Indexed polygons, and what can be said about them.
 
+mod polygon;
+mod source;
 mod stream;
 
+pub use polygon::triangulate;
+pub(crate) use source::Batch;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
 
 use glam::DVec3;
