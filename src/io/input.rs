@@ -54,7 +54,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Input> {
     let mut file = File::open(path).map_err(io_error)?;
     let metadata = file.metadata().map_err(io_error)?;
     let mut bytes = Vec::new();
-    if metadata.is_file() {
+    if metadata.is_file() && metadata.len() > 0 {
         (&mut file).take(PREFIX).read_to_end(&mut bytes).map_err(io_error)?;
         if let Some(input) = open_streamed(path, file, metadata.len(), &bytes)? {
             return Ok(input);
@@ -94,7 +94,7 @@ fn open_streamed(path: &Path, file: File, len: u64, prefix: &[u8]) -> Result<Opt
         trailing_bytes: 0,
     };
     let source: Box<dyn TriangleSource + Send> = match info.format {
-        Format::Stl if len > 0 && !stl::is_text(&super::text::decode(prefix), len) => {
+        Format::Stl if !stl::is_text(&super::text::decode(prefix), len) => {
             let stl = StlFile::open(path.to_owned(), file, len)?;
             info.polygons = stl.solids().triangles();
             info.trailing_bytes = stl.solids().trailing_bytes;

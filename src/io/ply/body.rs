@@ -24,6 +24,10 @@ pub(super) trait Body {
     /// An error at the next value.
     fn error(&self, problem: String, remedy: &str) -> Error;
 
+    /// Goes to the next record. In text it begins a line, and values too many on the line before are ignored, since some
+    /// exporters write more than their header says.
+    fn end_record(&mut self) {}
+
     /// Refuses an element that cannot fit in the bytes left, so that its count may be used to make room.
     fn check_size(&self, element: &Element) -> Result<()> {
         let least = |kind| match kind {
@@ -72,6 +76,7 @@ pub(super) trait Body {
             for property in &element.properties {
                 self.skip_property(property.kind, element)?;
             }
+            self.end_record();
         }
         Ok(())
     }
@@ -103,6 +108,7 @@ pub(super) trait Body {
                 }
             }
             visit(point)?;
+            self.end_record();
         }
         Ok(())
     }
@@ -134,6 +140,7 @@ pub(super) trait Body {
                 }
             }
             visit(self, record, &list)?;
+            self.end_record();
         }
         Ok(())
     }
@@ -199,6 +206,10 @@ impl Body for Text<'_> {
 
     fn error(&self, problem: String, remedy: &str) -> Error {
         self.error(problem, remedy)
+    }
+
+    fn end_record(&mut self) {
+        self.skip_line();
     }
 }
 

@@ -132,9 +132,9 @@ mod tests {
     #[test]
     fn errors_name_the_place_and_the_counts() {
         let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
-        let faces = "element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0 1 0 0 1 1 0\n";
+        let faces = "element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n1 1 0\n";
         let message = |text: &str| parse("t.ply", text.as_bytes()).expect_err(text).to_string();
-        assert!(message(&format!("{header}{faces}3 0 1 3")).contains("line 11: face 0 refers to vertex 3, but there are 3; "));
+        assert!(message(&format!("{header}{faces}3 0 1 3")).contains("line 13: face 0 refers to vertex 3, but there are 3; "));
         assert!(message(&format!("{header}{faces}3 0 1 -1")).contains("refers to vertex -1, "));
         assert!(message(&format!("{header}{faces}3 0 1 0.5")).contains("refers to vertex 0.5, "));
         assert!(message(&format!("{header}{faces}-3 0 1 2")).contains("a list with -3 entries"));
@@ -142,7 +142,7 @@ mod tests {
         let huge = header.replace("vertex 3", "vertex 4000000000000");
         assert!(message(&format!("{huge}end_header\n0 0 0")).contains("4000000000000 of `vertex` need at least"));
         assert!(message("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n").contains("no property `y`"));
-        let faces = "element face 1\nproperty list uchar int corners\nend_header\n0 0 0 1 0 0 1 1 0 3 0 1 2\n";
+        let faces = "element face 1\nproperty list uchar int corners\nend_header\n0 0 0\n1 0 0\n1 1 0 9 9\n3 0 1 2\n";
         assert!(message(&format!("{header}{faces}")).contains("no list `vertex_indices`"));
     }
 
@@ -150,7 +150,7 @@ mod tests {
     fn strips_become_triangles() {
         let text = "ply\nformat ascii 1.0\nelement vertex 5\nproperty int x\nproperty short y\nproperty double z\n\
                     element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
-                    0 0 0 1 0 0 0 1 0 1 1 0 0 2 0\n9 0 1 2 3 -1 1 3 3 4\n";
+                    0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0 too many\n9 0 1 2 3 -1 1 3 3 4\n";
         let mesh = parse("t.ply", text.as_bytes()).expect("valid").mesh;
         assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [[0, 1, 2], [2, 1, 3]]);
     }
