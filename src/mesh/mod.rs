@@ -4,19 +4,21 @@ mod polygon;
 mod report;
 pub mod sample;
 mod sets;
+mod source;
 mod star;
 mod stream;
 mod validate;
 
 pub use polygon::triangulate;
 pub use report::Report;
+pub(crate) use source::Batch;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
 pub use validate::Violation;
 
 use glam::DVec3;
 
 /// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
-/// [`report`](crate::mesh) tells which.
+/// [`report`](Mesh::report) tells which.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// Positions in model units.

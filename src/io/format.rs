@@ -1,0 +1,139 @@
+//! Which format a file has, from its content first.
+
+use super::{off, ply, stl, text};
+use crate::error::{Error, Place, Result};
+use std::fmt;
+use std::path::Path;
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// Stereolithography: triangles without connection; text or binary.
+    Stl,
+    /// Polygon file format (Stanford); text or binary.
+    Ply,
+    /// Wavefront OBJ; text.
+    Obj,
+    /// Object file format (Geomview); text.
+    Off,
+}
+
+/// How numbers are written in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Encoding {
+    /// As decimal text.
+    Text,
+    /// As binary numbers with the least significant byte first.
+    LittleEndian,
+    /// As binary numbers with the most significant byte first.
+    BigEndian,
+}
+
+impl Format {
+    /// The format that the end of a file's name says, in any letter case.
+    pub fn from_path(path: impl AsRef<Path>) -> Option<Format> {
+        match path.as_ref().extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "stl" => Some(Format::Stl),
+            "ply" => Some(Format::Ply),
+            "obj" => Some(Format::Obj),
+            "off" => Some(Format::Off),
+            _ => None,
+        }
+    }
+
+    /// The usual end of file names, in lower case.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Stl => "stl",
+            Format::Ply => "ply",
+            Format::Obj => "obj",
+            Format::Off => "off",
+        }
+    }
+
+    /// The format of a file of `len` bytes that begins with `prefix`: what the content says for sure, else `hint`, else
+    /// what the content looks like.
+    pub(super) fn detect(name: &str, prefix: &[u8], len: u64, hint: Option<Format>) -> Result<Format> {
+        Format::sniff(prefix, len).or(hint).or_else(|| looks_like_obj(prefix).then_some(Format::Obj)).ok_or_else(|| {
+            let problem = "neither the content nor the name says which format this is";
+            Error::format(name, Place::Whole, problem, "give it a name that ends in .stl, .ply, .obj or .off")
+        })
+    }
+
+    /// The format that the content says for sure.
+    fn sniff(prefix: &[u8], len: u64) -> Option<Format> {
+        if stl::is_exactly_binary(prefix, len) {
+            return Some(Format::Stl);
+        }
+        let text = text::decode(prefix);
+        let mut cursor = text::Text::new("", &text);
+        cursor.skip_blanks();
+        if ply::is_ply(&text) {
+            Some(Format::Ply)
+        } else if off::keyword(cursor.rest()).is_some() {
+            Some(Format::Off)
+        } else if stl::is_text(&text, len) {
+            Some(Format::Stl)
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Format::Stl => "STL",
+            Format::Ply => "PLY",
+            Format::Obj => "OBJ",
+            Format::Off => "OFF",
+        })
+    }
+}
+
+impl fmt::Display for Encoding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Encoding::Text => "text",
+            Encoding::LittleEndian => "binary",
+            Encoding::BigEndian => "binary, big endian",
+        })
+    }
+}
+
+/// Whether the first statement is one of OBJ.
+fn looks_like_obj(prefix: &[u8]) -> bool {
+    let text = text::decode(prefix);
+    let mut cursor = text::Text::with_continued_lines("", &text);
+    cursor.skip_blanks();
+    matches!(cursor.word(), b"v" | b"vn" | b"vt" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_goes_before_the_name() {
+        let detect = |bytes: &[u8], hint| Format::detect("t", bytes, bytes.len() as u64, hint).ok();
+        assert_eq!(detect(b"ply\nformat", Some(Format::Obj)), Some(Format::Ply));
+        assert_eq!(detect(b"\n# x\n COFF\n1 1 0", Some(Format::Stl)), Some(Format::Off));
+        assert_eq!(detect(b"\r\nSOLID x\nfacet", Some(Format::Ply)), Some(Format::Stl));
+        assert_eq!(detect(&[0; 84], Some(Format::Ply)), Some(Format::Stl));
+        assert_eq!(detect(b"# c\nv 1 2 3", None), Some(Format::Obj));
+        assert_eq!(detect(b"# c\nv 1 2 3", Some(Format::Off)), Some(Format::Off));
+        assert_eq!(detect(b"hello", None), None);
+        assert_eq!(detect(b"", None), None);
+    }
+
+    #[test]
+    fn names_say_formats_in_any_case() {
+        assert_eq!(Format::from_path("a/b.c.StL"), Some(Format::Stl));
+        for format in [Format::Stl, Format::Ply, Format::Obj, Format::Off] {
+            assert_eq!(Format::from_path(format!("x.{}", format.extension())), Some(format));
+        }
+        assert_eq!(Format::from_path("stl"), None);
+        assert_eq!(Format::from_path("x.gltf"), None);
+    }
+}
