@@ -324,6 +324,12 @@ impl Key {
         Key(CELL | (code & !(8 * low - 1)) | (7 * low))
     }
 
+    /// The interleaved lattice point of a cell, in the half-open sense, next to one of its corners. Domain: cells.
+    pub(crate) const fn code_inside(self, corner: Corner) -> u64 {
+        let below = 8 * self.lowest() - 1;
+        self.min_code() | FIELDS[corner.bits() as usize] & below
+    }
+
     /// The smallest cell that holds both. Domain: cells.
     ///
     /// ```
@@ -723,6 +729,7 @@ mod tests {
                 assert_eq!(child.corner(corner), cell.corner(corner));
                 assert_eq!(child.corner(!corner).center(), cell.center());
                 assert_eq!(child < cell, corner != Corner::MAX);
+                assert_eq!(Key::around(cell.code_inside(corner), level + 1), child);
             }
         }
         assert!(cell.points().eq(cell.corners()));

@@ -51,9 +51,8 @@ const SEEDS: [u64; 4] = [0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344, 0xa409_38
 ///
 /// # Memory
 ///
-/// A slot of the hash table takes `size_of::<(Key, T)>() + 1` bytes, 9 with an empty record and 17 with one of up to 8 bytes. Growth
-/// doubles the table at a load of 7/8, so a leaf costs between 8/7 and 16/7 slots, and from the first after `with_capacity` or
-/// [`shrink_to_fit`](LinearOctree::shrink_to_fit) unless the number of leaves lies just above 7/8 of a power of two. See
+/// A slot of the hash table takes `size_of::<(Key, T)>() + 1` bytes: 9 with an empty record, 17 with one of 1 to 8 bytes. The number of
+/// slots is a power of two and at most 7/8 of them are used, so a leaf costs between 8/7 and 16/7 slots. See
 /// [`allocated_bytes`](LinearOctree::allocated_bytes).
 ///
 /// # Order

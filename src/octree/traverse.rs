@@ -116,13 +116,20 @@ pub struct LeavesIn<'a, T> {
 }
 
 impl<'a, T> LeavesIn<'a, T> {
-    /// The leaves inside `cell` that meet its face, edge or corner in a direction.
+    /// The leaves inside `cell`, but not itself, that meet its face, edge or corner in a direction.
     pub(super) fn beside(tree: &'a LinearOctree<T>, cell: Key, direction: Direction) -> Self {
-        Self::new(tree, cell, direction.shared(), direction.corner())
+        let within = Self::new(tree, cell, direction.shared(), direction.corner());
+        LeavesIn { next: within.down(cell), ..within }
     }
 
     fn new(tree: &'a LinearOctree<T>, cell: Key, free: Extent, first: Corner) -> Self {
         LeavesIn { tree, cell, free, first, next: Some(cell) }
+    }
+
+    /// The first child to visit, if there are leaves of finer levels at all.
+    fn down(&self, cell: Key) -> Option<Key> {
+        let finer = self.tree.levels.occupied >> cell.level()? > 1;
+        finer.then(|| cell.child(self.first))
     }
 
     /// The first cell after `cell` and all it holds.
@@ -145,17 +152,13 @@ impl<'a, T> Iterator for LeavesIn<'a, T> {
     type Item = (Key, &'a T);
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (tree, levels) = (self.tree, &self.tree.levels);
+        let tree = self.tree;
         while let Some(cell) = self.next {
-            let level = cell.level()?;
-            if levels.has(level)
-                && let Some(record) = tree.get(cell)
-            {
+            if let Some(record) = tree.get(cell) {
                 self.next = self.after(cell);
                 return Some((cell, record));
             }
-            let finer = levels.occupied >> level > 1;
-            self.next = if finer { Some(cell.child(self.first)) } else { self.after(cell) };
+            self.next = self.down(cell).or_else(|| self.after(cell));
         }
         None
     }
