@@ -1,5 +1,5 @@
-//! The octree around a sphere, 2.5 million leaves of levels up to 9: look-ups beside an ordered map and a sorted array, leaf
-//! search, neighbours, traversal. Times are for one element each.
+//! The octree around a sphere, 2.5 million leaves of levels up to 9: look-ups beside an ordered map and a sorted array,
+//! leaf search, neighbours, traversal. Times are for one element each.
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
