@@ -33,11 +33,11 @@
 //! before the cell, those in child 7 after it. Sort by [`Key::depth_first_rank`] for the order in which parents come
 //! before their children.
 
-use std::cmp::Ordering;
-use std::fmt;
-
 mod incidence;
 mod morton;
+
+use std::cmp::Ordering;
+use std::fmt;
 
 use super::axis::{Axis, Corner, Extent};
 use morton::{CODE, FIELDS};
@@ -50,6 +50,7 @@ pub const SIDE: u32 = 1 << 19;
 
 /// Level of the finest cells, which have a side of 2 lattice units.
 pub const MAX_LEVEL: u32 = 18;
+
 /// Where the extent starts in a key, and how many bits the interleaved coordinates have.
 const EXTENT_SHIFT: u32 = 60;
 /// The extent of a cell.

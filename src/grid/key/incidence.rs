@@ -4,7 +4,7 @@ use std::iter::FusedIterator;
 
 use super::morton::{add, field, raise, subtract};
 use super::{EXTENT_SHIFT, Key, MAX_LEVEL};
-use crate::grid::axis::{Corner, Direction, Edge, Face};
+use crate::grid::axis::{Axis, Corner, Direction, Edge, Extent, Face};
 
 /// Incidence and neighbours.
 impl Key {
@@ -15,8 +15,7 @@ impl Key {
     /// ends, a point nothing.
     pub fn boundary(self) -> Incident {
         let half = if self.is_point() { 0 } else { 1 << (3 * self.trailing()) };
-        let pairs = self.dir().axes().map(|axis| 0b11 << (2 * axis.index())).sum();
-        Incident { key: self, half, faces: pairs }
+        Incident { key: self, half, faces: faces_across(self.dir()) }
     }
 
     /// The elements of its own level and of one dimension more in whose boundary it lies: for each axis not in its
@@ -35,11 +34,12 @@ impl Key {
         debug_assert!(self.level().is_none_or(|own| own == level), "of its own level");
         let half = 1 << (3 * (MAX_LEVEL - level));
         debug_assert!(!self.is_point() || self.code() & (8 * half - 1) == 0, "level {level} has no corner at {self}");
-        let sides = self.dir().complement().axes().map(|axis| {
+        let inside = Axis::ALL.into_iter().fold(0, |faces, axis| {
             let at = self.0 & field(axis);
-            (u32::from(at != 0) | u32::from(at != SIDE_CODE & field(axis)) << 1) << (2 * axis.index())
+            let (low, high) = (u32::from(at != 0), u32::from(at != SIDE_CODE & field(axis)));
+            faces | (low | high << 1) << (2 * axis.index())
         });
-        Incident { key: self, half, faces: sides.sum() }
+        Incident { key: self, half, faces: inside & faces_across(self.dir().complement()) }
     }
 
     /// The same element one side further across a face: the neighbour of the same size. `None` outside the root.
@@ -129,6 +129,13 @@ impl Key {
 
 /// The coordinate 2^19 on all three axes, interleaved.
 const SIDE_CODE: u64 = 7 << 57;
+
+/// The two faces across each axis of an extent, bit `i` for face `i`.
+const fn faces_across(extent: Extent) -> u32 {
+    let axes = extent.bits() as u32;
+    (axes >> 2 & 1) * 0b11 + (axes >> 1 & 1) * 0b1100 + (axes & 1) * 0b11_0000
+}
+
 /// The elements of [`Key::boundary`] or [`Key::coboundary`]; at most six, made as they are asked for.
 #[derive(Debug, Clone)]
 pub struct Incident {
