@@ -109,7 +109,9 @@ impl fmt::Display for Warning {
                 f,
                 "the input encloses nothing at this resolution: open sheets and walls thinner than a cell vanish; try a greater depth"
             ),
-            Warning::SkippedTriangles(n) => write!(f, "{n} triangles with coordinates that are not finite were left out"),
+            Warning::SkippedTriangles(n) => {
+                write!(f, "{n} triangles with coordinates that are not finite were left out")
+            }
             Warning::HolesClosed(n) => write!(f, "the surface was open: {n} holes were closed"),
             Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (on {n} grid edges)"),
         }

@@ -62,7 +62,10 @@ pub fn dual_contouring(
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
     let crossings = octree.crossings();
-    assert!(options.placement == Placement::MassPoint || crossings.with_normals() || crossings.is_empty(), "sharp features need normals");
+    assert!(
+        options.placement == Placement::MassPoint || crossings.with_normals() || crossings.is_empty(),
+        "sharp features need normals"
+    );
     let bricks = crossings.bricks().len();
     progress.begin(Stage::Contour, 2 * bricks as u64);
     let layout = Layout::new(octree);
@@ -140,7 +143,8 @@ impl<'a> Layout<'a> {
         let mut layout = Layout { octree, bricks: Vec::with_capacity(found.len()), knots: Vec::new(), vertices: 0 };
         for (mixed, knots) in found {
             let first = u32::try_from(layout.vertices).expect("fewer than 2^32 vertices");
-            layout.vertices += u64::from(mixed.count()) + knots.iter().map(|k| u64::from(k.extra_vertices())).sum::<u64>();
+            layout.vertices +=
+                u64::from(mixed.count()) + knots.iter().map(|k| u64::from(k.extra_vertices())).sum::<u64>();
             layout.bricks.push(CellBrick { mixed, first, knots: layout.knots.len() as u32 });
             layout.knots.extend(knots);
         }
@@ -273,7 +277,9 @@ impl<'a> Layout<'a> {
             table.fill(&cells, |axis, number| Tangent {
                 position: position(crossings.offsets()[number as usize]) as f32,
                 normal: match placement {
-                    Placement::SharpFeatures => NormalCode(crossings.normals()[number as usize]).decode(Axis::ALL[axis]).as_vec3(),
+                    Placement::SharpFeatures => {
+                        NormalCode(crossings.normals()[number as usize]).decode(Axis::ALL[axis]).as_vec3()
+                    }
                     Placement::MassPoint => Vec3::ZERO,
                 },
             });
@@ -303,7 +309,8 @@ impl<'a> Layout<'a> {
     ) -> Faces {
         let bricks = &self.octree.crossings().bricks()[range.clone()];
         let quads = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
-        let mut faces = Faces { triangles, corners: Vec::with_capacity(quads * if triangles { 6 } else { 4 }), others: Vec::new() };
+        let mut faces =
+            Faces { triangles, corners: Vec::with_capacity(quads * if triangles { 6 } else { 4 }), others: Vec::new() };
         let from = extra.partition_point(|(brick, _)| *brick < range.start);
         let extra = extra[from..].iter().take_while(|(brick, _)| *brick < range.end);
         for i in range.clone() {
@@ -408,8 +415,10 @@ fn place_in_cell(
         }
         // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.
         for corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
-            let around: Vec<DVec3> = of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| crossing(e).0).collect();
-            let own = if around.is_empty() { middle(&[point([0; 3], corner), DVec3::splat(0.5)]) } else { middle(&around) };
+            let around: Vec<DVec3> =
+                of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| crossing(e).0).collect();
+            let own =
+                if around.is_empty() { middle(&[point([0; 3], corner), DVec3::splat(0.5)]) } else { middle(&around) };
             place(own.lerp(common, 0.25));
         }
     }
@@ -468,7 +477,8 @@ impl CellTable {
             let [u, v] = axis.others();
             let (su, sv) = (STEP[u.index()], STEP[v.index()]);
             // The four cells round the edge, counter-clockwise in (u, v), and the corner of each at the edge's start.
-            let round = [(su + sv, Corner::MIN | u | v), (sv, Corner::MIN | v), (0, Corner::MIN), (su, Corner::MIN | u)];
+            let round =
+                [(su + sv, Corner::MIN | u | v), (sv, Corner::MIN | v), (0, Corner::MIN), (su, Corner::MIN | u)];
             for edge in brick.crossed[axis.index()].iter() {
                 let [x, y, z] = edge.coords().map(|c| c as usize + 1);
                 let at = (x * CELL_SIDE + y) * CELL_SIDE + z;

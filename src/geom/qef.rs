@@ -54,11 +54,9 @@ impl Qef {
     pub fn minimiser(&self) -> DVec3 {
         let mass = self.mass_point();
         let [xx, xy, xz, yy, yz, zz] = self.products;
-        let product = |v: DVec3| DVec3::new(
-            xx * v.x + xy * v.y + xz * v.z,
-            xy * v.x + yy * v.y + yz * v.z,
-            xz * v.x + yz * v.y + zz * v.z,
-        );
+        let product = |v: DVec3| {
+            DVec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
+        };
         let r = self.moments - product(mass);
         // Solve (products + penalty) d = r by cofactors: the matrix is symmetric, and positive thanks to the penalty.
         let penalty = PENALTY * self.count;
@@ -67,11 +65,8 @@ impl Qef {
         let (ca, cb, cc) = (d * f - e * e, c * e - b * f, b * e - c * d);
         let (cd, ce, cf) = (a * f - c * c, b * c - a * e, a * d - b * b);
         let det = a * ca + b * cb + c * cc;
-        let step = DVec3::new(
-            ca * r.x + cb * r.y + cc * r.z,
-            cb * r.x + cd * r.y + ce * r.z,
-            cc * r.x + ce * r.y + cf * r.z,
-        );
+        let step =
+            DVec3::new(ca * r.x + cb * r.y + cc * r.z, cb * r.x + cd * r.y + ce * r.z, cc * r.x + ce * r.y + cf * r.z);
         mass + step / det
     }
 }
@@ -88,7 +83,8 @@ mod tests {
 
     #[test]
     fn a_corner_is_found() {
-        let q = qef(&[([0.3, 0.5, 0.1], [1., 0., 0.]), ([0.2, 0.6, 0.9], [0., 1., 0.]), ([0.9, 0.1, 0.7], [0., 0., 1.])]);
+        let q =
+            qef(&[([0.3, 0.5, 0.1], [1., 0., 0.]), ([0.2, 0.6, 0.9], [0., 1., 0.]), ([0.9, 0.1, 0.7], [0., 0., 1.])]);
         assert!(q.minimiser().distance(DVec3::new(0.3, 0.6, 0.7)) < 5e-3, "{}", q.minimiser());
         assert!((q.flatness() - 1.0 / 3.0).abs() < 1e-12);
     }

@@ -191,7 +191,8 @@ fn line_length(bytes: &[u8]) -> usize {
     /// Wide enough for the search to be vectorised.
     const BLOCK: usize = 32;
     let is_end = |b: &u8| *b == b'\n' || *b == b'\r';
-    let clear = bytes.chunks_exact(BLOCK).take_while(|block| !block.iter().fold(false, |any, b| any | is_end(b))).count();
+    let clear =
+        bytes.chunks_exact(BLOCK).take_while(|block| !block.iter().fold(false, |any, b| any | is_end(b))).count();
     let start = clear * BLOCK;
     bytes[start..].iter().position(is_end).map_or(bytes.len(), |length| start + length)
 }

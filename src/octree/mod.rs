@@ -1,8 +1,8 @@
 //! [`LinearOctree`]: an octree without pointers, a hash map from the [`Key`] of each leaf to its record.
 //!
-//! Only leaves are stored. Parents, children and neighbours are arithmetic on keys, so that a tree costs its records, 8 bytes of
-//! key and one control byte per slot, and changing a leaf never touches another one. The tree knows which levels have leaves and how
-//! many; that keeps searches to the levels that occur.
+//! Only leaves are stored. Parents, children and neighbours are arithmetic on keys, so that a tree costs its records, 8
+//! bytes of key and one control byte per slot, and changing a leaf never touches another one. The tree knows which
+//! levels have leaves and how many; that keeps searches to the levels that occur.
 //!
 //! ```
 //! use zmend::grid::{Corner, Face, Key};
@@ -49,21 +49,20 @@ const SEEDS: [u64; 4] = [0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344, 0xa409_38
 
 /// A set of cells that do not overlap, the leaves, each with a record of type `T`.
 ///
-/// The leaves need not cover the root cube. No operation but the checked [`try_insert`](LinearOctree::try_insert) looks for
-/// overlaps; [`validate`](LinearOctree::validate) does. With overlapping leaves nothing is undefined, but searches return any one
-/// of the leaves that overlap.
+/// The leaves need not cover the root cube. No operation but the checked [`try_insert`](LinearOctree::try_insert) looks
+/// for overlaps; [`validate`](LinearOctree::validate) does. With overlapping leaves nothing is undefined, but searches
+/// return any one of the leaves that overlap.
 ///
 /// # Memory
 ///
-/// A slot of the hash table takes `size_of::<(Key, T)>() + 1` bytes, 9 with an empty record and 17 with one of up to 8 bytes. Growth
-/// doubles the table at a load of 7/8, so a leaf costs between 8/7 and 16/7 slots, and from the first after `with_capacity` or
-/// [`shrink_to_fit`](LinearOctree::shrink_to_fit) unless the number of leaves lies just above 7/8 of a power of two. See
-/// [`allocated_bytes`](LinearOctree::allocated_bytes).
+/// A slot of the hash table takes `size_of::<(Key, T)>() + 1` bytes: 9 with an empty record, 17 with one of 1 to 8
+/// bytes. The number of slots is a power of two and at most 7/8 of them are used, so a leaf costs between 8/7 and 16/7
+/// slots. See [`allocated_bytes`](LinearOctree::allocated_bytes).
 ///
 /// # Order
 ///
-/// The order of [`iter`](LinearOctree::iter) is arbitrary and depends on the history of the tree; it must never reach a result. The
-/// `_z` traversals give Z-order, whatever the history and the number of threads.
+/// The order of [`iter`](LinearOctree::iter) is arbitrary and depends on the history of the tree; it must never reach a
+/// result. The `_z` traversals give Z-order, whatever the history and the number of threads.
 #[derive(Clone)]
 pub struct LinearOctree<T> {
     leaves: HashMap<Key, T, RandomState>,
@@ -124,7 +123,8 @@ impl<T> LinearOctree<T> {
         self.leaves.contains_key(&leaf)
     }
 
-    /// The record of exactly this leaf. One probe; see [`leaf_over`](LinearOctree::leaf_over) for a leaf that may be larger.
+    /// The record of exactly this leaf. One probe; see [`leaf_over`](LinearOctree::leaf_over) for a leaf that may be
+    /// larger.
     pub fn get(&self, leaf: Key) -> Option<&T> {
         self.leaves.get(&leaf)
     }
@@ -134,7 +134,8 @@ impl<T> LinearOctree<T> {
         self.leaves.get_mut(&leaf)
     }
 
-    /// Makes the cell a leaf, without looking whether it overlaps others; returns the record it had, if it was one. One probe.
+    /// Makes the cell a leaf, without looking whether it overlaps others; returns the record it had, if it was one. One
+    /// probe.
     ///
     /// # Panics
     ///
@@ -148,11 +149,11 @@ impl<T> LinearOctree<T> {
         old
     }
 
-    /// As [`insert`](LinearOctree::insert), but refuses keys that are not cells, and cells inside another leaf. One probe for each
-    /// level with leaves above the cell's.
+    /// As [`insert`](LinearOctree::insert), but refuses keys that are not cells, and cells inside another leaf. One
+    /// probe for each level with leaves above the cell's.
     ///
-    /// It does not see leaves INSIDE the cell, which no few probes could tell; there can be none while cells are inserted from
-    /// coarse to fine.
+    /// It does not see leaves INSIDE the cell, which no few probes could tell; there can be none while cells are
+    /// inserted from coarse to fine.
     ///
     /// # Errors
     ///

@@ -3,34 +3,37 @@
 use std::iter::FusedIterator;
 
 use super::{LeavesIn, LinearOctree};
+use crate::grid::key::MAX_LEVEL;
 use crate::grid::{Direction, Key};
 
 /// Neighbours, found by arithmetic and probes; nothing is stored.
 impl<T> LinearOctree<T> {
-    /// The leaves that touch a cell in one direction, that is across a [`Face`](crate::grid::Face), an [`Edge`](crate::grid::Edge) or a
-    /// [`Corner`](crate::grid::Corner), with their records.
+    /// The leaves that touch a cell in one direction, that is across a [`Face`](crate::grid::Face), an
+    /// [`Edge`](crate::grid::Edge) or a [`Corner`](crate::grid::Corner), with their records.
     ///
-    /// It is the one leaf that is, or holds, the neighbour of the same size, or else the smaller leaves inside that neighbour
-    /// whose boundary meets the face, edge or corner shared with the cell, in Z-order. A larger leaf across an edge or
-    /// corner may lie across a face as well. The cell itself may be any cell, a leaf or not.
+    /// It is the one leaf that is, or holds, the neighbour of the same size, or else the smaller leaves inside that
+    /// neighbour whose boundary meets the face, edge or corner shared with the cell, in Z-order. A larger leaf across
+    /// an edge or corner may lie across a face as well. The cell itself may be any cell, a leaf or not.
     ///
-    /// Costs a probe for each level with leaves up to the cell's own; and when smaller leaves are found, a probe for each of them
-    /// and each of their ancestors in the neighbour. Where the space is EMPTY, all cells along the face (edge, corner) down to the
-    /// finest level are looked for: up to 4^d (2^d, 1) probes, `d` levels below the cell. Trees that cover the root have no such places.
+    /// Costs one probe if it has the same size; a probe for each level with leaves between their sizes on both sides if
+    /// it is larger, and when leaves are smaller, also one for each of them and of their ancestors in the neighbour:
+    /// three to six in a balanced tree. Where the space is EMPTY, all cells along the face (edge, corner) down to the
+    /// finest level are looked for: up to 4^d (2^d, 1) probes, `d` levels below the cell. Trees that cover the root
+    /// have no such places. Domain: cells.
     pub fn neighbours(&self, cell: Key, direction: impl Into<Direction>) -> Neighbours<'_, T> {
         let direction = direction.into();
-        let beyond = cell.toward(direction);
-        let whole = beyond.and_then(|beyond| self.leaf_over(beyond));
-        let parts = match (beyond, whole) {
-            (Some(beyond), None) => Some(LeavesIn::beside(self, beyond, direction.opposite())),
-            _ => None,
-        };
-        Neighbours { whole, parts }
+        let Some(beyond) = cell.toward(direction) else { return Neighbours { whole: None, parts: None } };
+        let back = direction.opposite();
+        let level = beyond.level().unwrap_or(MAX_LEVEL);
+        match self.nearest_around(beyond.code_inside(back.corner()), level) {
+            Some(leaf) if leaf.0.size() >= beyond.size() => Neighbours { whole: Some(leaf), parts: None },
+            _ => Neighbours { whole: None, parts: Some(LeavesIn::beside(self, beyond, back)) },
+        }
     }
 
-    /// All leaves other than the cell that touch it, across faces, edges and corners, each once, with their records: by direction in the
-    /// order of [`Direction::ALL`], then in Z-order. Domain: leaves of this tree. Costs as [`neighbours`](LinearOctree::neighbours)
-    /// 26 times.
+    /// All leaves other than the cell that touch it, across faces, edges and corners, each once, with their records: by
+    /// direction in the order of [`Direction::ALL`], then in Z-order. Domain: leaves of this tree. Costs as
+    /// [`neighbours`](LinearOctree::neighbours) 26 times.
     pub fn all_neighbours(&self, leaf: Key) -> impl Iterator<Item = (Key, &T)> {
         Direction::ALL.into_iter().enumerate().flat_map(move |(i, direction)| {
             // A larger one fills several directions and counts in the first.
@@ -78,7 +81,8 @@ mod tests {
                     let found: Vec<Key> = tree.neighbours(leaf, direction).map(|(key, _)| key).collect();
                     prop_assert_eq!(&found, &oracle.neighbours(leaf, direction), "{} {}", leaf, direction);
                     for other in found {
-                        prop_assert!(other.size() > leaf.size() || tree.neighbours(other, direction.opposite()).any(|(k, _)| k == leaf));
+                        let mut back = tree.neighbours(other, direction.opposite());
+                        prop_assert!(other.size() > leaf.size() || back.any(|(key, _)| key == leaf));
                     }
                 }
                 let all: Vec<Key> = tree.all_neighbours(leaf).map(|(key, _)| key).collect();

@@ -11,8 +11,8 @@ pub(super) fn points(max: usize) -> impl Strategy<Value = Vec<[u32; 3]>> {
     prop::collection::vec([0..=SIDE, 0..=SIDE, 0..=SIDE], 0..=max)
 }
 
-/// Trees with leaves of levels up to `depth`: the root, split around random points to random levels, with random leaves missing.
-/// The record of each leaf is the bits of its key.
+/// Trees with leaves of levels up to `depth`: the root, split around random points to random levels, with random leaves
+/// missing. The record of each leaf is the bits of its key.
 pub(super) fn tree(depth: u32) -> impl Strategy<Value = LinearOctree<u64>> {
     let splits = prop::collection::vec(([0..SIDE, 0..SIDE, 0..SIDE], 1..=depth), 0..6);
     (splits, prop::collection::vec(any::<prop::sample::Index>(), 0..8)).prop_map(|(splits, missing)| {

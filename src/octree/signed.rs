@@ -58,7 +58,8 @@ impl SignedOctree {
     pub fn volume(&self) -> f64 {
         // Sums of fixed chunks in a fixed order: the same for any number of threads.
         let bricks = self.crossings.bricks().par_chunks(256).zip(self.inside.par_chunks(256));
-        let sums: Vec<f64> = bricks.map(|(bricks, inside)| bricks.iter().zip(inside).map(|b| self.volume_of(b.0, b.1)).sum()).collect();
+        let sums: Vec<f64> =
+            bricks.map(|(bricks, inside)| bricks.iter().zip(inside).map(|b| self.volume_of(b.0, b.1)).sum()).collect();
         sums.iter().sum()
     }
 

@@ -9,8 +9,9 @@ use crate::grid::{Corner, Direction, Extent, Key};
 
 /// Traversal.
 ///
-/// The plain ones go through the table: O(n), no memory, arbitrary order. The `_z` ones collect a key and a reference for each
-/// leaf, 16 bytes, and sort them: O(n log n), and the same order whatever the tree's history and the number of threads.
+/// The plain ones go through the table: O(n), no memory, arbitrary order. The `_z` ones collect a key and a reference
+/// for each leaf, 16 bytes, and sort them: O(n log n), and the same order whatever the tree's history and the number of
+/// threads.
 impl<T> LinearOctree<T> {
     /// All leaves in arbitrary order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (Key, &T)> + Clone {
@@ -45,8 +46,8 @@ impl<T> LinearOctree<T> {
 
     /// The leaves that are this cell or lie inside it, in Z-order; not a larger one that holds it. Any cell will do.
     ///
-    /// Costs a probe for each of them and each of their ancestors in the cell; where the cell is EMPTY, up to 8^d probes with
-    /// leaves `d` levels below it elsewhere in the tree.
+    /// Costs a probe for each of them and each of their ancestors in the cell; where the cell is EMPTY, up to 8^d
+    /// probes with leaves `d` levels below it elsewhere in the tree.
     ///
     /// ```
     /// use zmend::grid::Key;
@@ -67,8 +68,8 @@ impl<T: Sync> LinearOctree<T> {
         self.leaves.par_iter().map(|(&leaf, record)| (leaf, record))
     }
 
-    /// All leaves in Z-order on all threads. Each thread works on stretches of the curve, and what is collected is in order, so
-    /// that results do not depend on the number of threads; for sums of floats, collect first.
+    /// All leaves in Z-order on all threads. Each thread works on stretches of the curve, and what is collected is in
+    /// order, so that results do not depend on the number of threads; for sums of floats, collect first.
     ///
     /// ```
     /// use rayon::prelude::*;
@@ -101,7 +102,8 @@ impl<T: Send> LinearOctree<T> {
     }
 }
 
-/// The leaves inside a cell in Z-order: [`LinearOctree::leaves_in`]. Or only those that meet one face, edge or corner of it.
+/// The leaves inside a cell in Z-order: [`LinearOctree::leaves_in`]. Or only those that meet one face, edge or corner
+/// of it.
 ///
 /// A depth-first walk without a stack: what comes after a cell is its next sibling, or what comes after its parent.
 #[derive(Debug)]
@@ -116,13 +118,20 @@ pub struct LeavesIn<'a, T> {
 }
 
 impl<'a, T> LeavesIn<'a, T> {
-    /// The leaves inside `cell` that meet its face, edge or corner in a direction.
+    /// The leaves inside `cell`, but not itself, that meet its face, edge or corner in a direction.
     pub(super) fn beside(tree: &'a LinearOctree<T>, cell: Key, direction: Direction) -> Self {
-        Self::new(tree, cell, direction.shared(), direction.corner())
+        let within = Self::new(tree, cell, direction.shared(), direction.corner());
+        LeavesIn { next: within.down(cell), ..within }
     }
 
     fn new(tree: &'a LinearOctree<T>, cell: Key, free: Extent, first: Corner) -> Self {
         LeavesIn { tree, cell, free, first, next: Some(cell) }
+    }
+
+    /// The first child to visit, if there are leaves of finer levels at all.
+    fn down(&self, cell: Key) -> Option<Key> {
+        let finer = self.tree.levels.occupied >> cell.level()? > 1;
+        finer.then(|| cell.child(self.first))
     }
 
     /// The first cell after `cell` and all it holds.
@@ -145,17 +154,13 @@ impl<'a, T> Iterator for LeavesIn<'a, T> {
     type Item = (Key, &'a T);
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (tree, levels) = (self.tree, &self.tree.levels);
+        let tree = self.tree;
         while let Some(cell) = self.next {
-            let level = cell.level()?;
-            if levels.has(level)
-                && let Some(record) = tree.get(cell)
-            {
+            if let Some(record) = tree.get(cell) {
                 self.next = self.after(cell);
                 return Some((cell, record));
             }
-            let finer = levels.occupied >> level > 1;
-            self.next = if finer { Some(cell.child(self.first)) } else { self.after(cell) };
+            self.next = self.down(cell).or_else(|| self.after(cell));
         }
         None
     }

@@ -36,8 +36,8 @@ pub enum Violation {
 impl<T> LinearOctree<T> {
     /// Whether all keys are cells, the counts of levels are right and no two leaves overlap.
     ///
-    /// O(n), with a probe for each leaf and each level with leaves above its own. It is the only check that sees a leaf inserted
-    /// AROUND others.
+    /// O(n), with a probe for each leaf and each level with leaves above its own. It is the only check that sees a leaf
+    /// inserted AROUND others.
     ///
     /// # Errors
     ///
@@ -81,7 +81,8 @@ mod tests {
                 tree.insert(cell, 0);
             }
             let keys = tree.keys_z();
-            let inner = keys.iter().copied().find(|&inner| keys.iter().any(|&outer| outer != inner && outer.contains(inner)));
+            let is_inside = |&inner: &Key| keys.iter().any(|&outer| outer != inner && outer.contains(inner));
+            let inner = keys.iter().copied().find(is_inside);
             match tree.validate() {
                 Ok(()) => prop_assert_eq!(inner, None),
                 Err(Violation::Overlap { outer, inner: found }) => {

@@ -59,7 +59,11 @@ impl PlyFile {
             (_, None) => true,
         };
         let repeats = |name| header.elements.iter().filter(|e| e.name == name).count() > 1;
-        if header.encoding == Encoding::Text || !is_ordered || at("tristrips").is_some() || repeats("vertex") || repeats("face")
+        if header.encoding == Encoding::Text
+            || !is_ordered
+            || at("tristrips").is_some()
+            || repeats("vertex")
+            || repeats("face")
         {
             return Ok(None);
         }

@@ -72,7 +72,9 @@ mod tests {
     /// The body that goes with it, written by `put(type size, value)`.
     fn body(mut put: impl FnMut(char, f64)) {
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
-            [('B', 7.0), ('f', x), ('f', y), ('f', 0.0), ('B', 1.0), ('h', -5.0)].into_iter().for_each(|(t, v)| put(t, v));
+            [('B', 7.0), ('f', x), ('f', y), ('f', 0.0), ('B', 1.0), ('h', -5.0)]
+                .into_iter()
+                .for_each(|(t, v)| put(t, v));
         }
         [('H', 1.0), ('d', 0.1), ('i', -1.0), ('H', 0.0), ('i', 8.0)].into_iter().for_each(|(t, v)| put(t, v));
         for face in [&[0, 1, 2][..], &[0, 1, 2, 3], &[]] {
@@ -134,14 +136,20 @@ mod tests {
         let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
         let faces = "element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n1 1 0\n";
         let message = |text: &str| parse("t.ply", text.as_bytes()).expect_err(text).to_string();
-        assert!(message(&format!("{header}{faces}3 0 1 3")).contains("line 13: face 0 refers to vertex 3, but there are 3; "));
+        assert!(
+            message(&format!("{header}{faces}3 0 1 3"))
+                .contains("line 13: face 0 refers to vertex 3, but there are 3; ")
+        );
         assert!(message(&format!("{header}{faces}3 0 1 -1")).contains("refers to vertex -1, "));
         assert!(message(&format!("{header}{faces}3 0 1 0.5")).contains("refers to vertex 0.5, "));
         assert!(message(&format!("{header}{faces}-3 0 1 2")).contains("a list with -3 entries"));
         assert!(message(&format!("{header}{faces}3 0 1 x")).contains("found `x`"));
         let huge = header.replace("vertex 3", "vertex 4000000000000");
         assert!(message(&format!("{huge}end_header\n0 0 0")).contains("4000000000000 of `vertex` need at least"));
-        assert!(message("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n").contains("no property `y`"));
+        assert!(
+            message("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n")
+                .contains("no property `y`")
+        );
         let faces = "element face 1\nproperty list uchar int corners\nend_header\n0 0 0\n1 0 0\n1 1 0 9 9\n3 0 1 2\n";
         assert!(message(&format!("{header}{faces}")).contains("no list `vertex_indices`"));
     }

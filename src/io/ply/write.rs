@@ -22,7 +22,12 @@ impl PlyEncoder {
 }
 
 /// The header of a PLY file.
-pub(in crate::io) fn write_header(encoding: &str, sizes: MeshSizes, precision: Precision, has_short_faces: bool) -> String {
+pub(in crate::io) fn write_header(
+    encoding: &str,
+    sizes: MeshSizes,
+    precision: Precision,
+    has_short_faces: bool,
+) -> String {
     let float = if precision == Precision::Single { "float" } else { "double" };
     let count = if has_short_faces { "uchar" } else { "uint" };
     let index = if sizes.points <= 1 << 31 { "int" } else { "uint" };
