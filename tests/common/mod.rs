@@ -192,8 +192,7 @@ pub(crate) fn closed_meshes(data: &Path) -> Vec<(String, Mesh)> {
 pub(crate) fn volume(mesh: &Mesh) -> f64 {
     let Some(&origin) = mesh.points.first() else { return 0.0 };
     let at = |i: u32| mesh.points[i as usize] - origin;
-    let of_face =
-        |face: &[u32]| face.windows(2).map(|w| at(face[0]).cross(at(w[0])).dot(at(w[1]))).sum::<f64>() / 6.0;
+    let of_face = |face: &[u32]| face.windows(2).map(|w| at(face[0]).cross(at(w[0])).dot(at(w[1]))).sum::<f64>() / 6.0;
     mesh.faces.iter().map(of_face).sum()
 }
 
