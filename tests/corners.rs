@@ -149,7 +149,19 @@ fn touching_boxes_become_one() {
             let whole = with_points(&together(&[a.clone(), b.clone()]), |p| rotation * p);
             for depth in [5, 6, 7] {
                 let (topology, repaired) = mended(what, &whole, depth);
-                assert_eq!(topology, Topology::new(1, 0), "{what} at depth {depth}");
+                // The grid may cut off the tip of a corner, as a solid of its own; what is left of the wall would be a cavity.
+                assert_eq!(topology.genus(), 0, "{what} at depth {depth}");
+                let cell = repaired.report.frame.cell_size();
+                let (low, high) =
+                    (a.points[0].max(b.points[0]) + 1.5 * cell, a.points[7].min(b.points[7]) - 1.5 * cell);
+                let on_wall = repaired.mesh.points.iter().map(|&p| rotation.transpose() * p).find(|q| {
+                    (q.x - 1.0).abs() < 0.5 * cell && low.y < q.y && q.y < high.y && low.z < q.z && q.z < high.z
+                });
+                assert_eq!(on_wall, None, "{what} at depth {depth}");
+                if b.points[7].y == 1.0 {
+                    let one = with_points(&boxed(DVec3::ZERO, b.points[7], false), |p| rotation * p);
+                    assert_eq!(mended("one box", &one, depth).0, topology, "{what} at depth {depth}");
+                }
                 let expected = volume(&a) + volume(&b);
                 let error = volume(&mend(&whole, depth, DC).mesh) / expected - 1.0;
                 assert!(error.abs() < 0.01, "{what} at depth {depth}: volume off by {error}");
@@ -304,7 +316,14 @@ fn thin_slabs_stay_closed_whatever_their_angle() {
         let slab = boxed(DVec3::ZERO, DVec3::new(1.0, 1.0, thickness), false);
         for seed in 0..6 {
             let rotation = Chance(seed).rotation();
-            mended("slab", &with_points(&slab, |p| rotation * p), 6);
+            let slab = with_points(&slab, |p| rotation * p);
+            for (mode, surface, triangles) in SURFACES {
+                let repaired = repair(slab.clone(), &options(6, surface, triangles)).expect("repairable");
+                assert_eq!(repaired.mesh.validate(), Ok(()), "{mode}");
+                // Both walls of a slab in one cell share its vertex in dual surfaces: these may turn over where it is flat.
+                let least = if surface == MC { 0.0 } else { -1e-3 };
+                assert!(volume(&repaired.mesh) >= least, "{mode}: {}", volume(&repaired.mesh));
+            }
         }
         let (topology, repaired) = mended("slab", &slab, 6);
         assert!(topology == Topology::NOTHING || topology == Topology::new(1, 0), "{topology:?}");
@@ -461,13 +480,14 @@ fn clean_samples_come_back_within_half_a_cell() {
 fn clean_data_come_back_within_half_a_cell() {
     let Some(data) = data() else { return };
     let cases = [
-        clean("cgal/cheese.off", 8, 1, 133, 0.5, 1.2),
-        clean("topomender/meshfile.obj", 8, 1, 1, 0.5, 1.2),
-        clean("cgal/knot2.off", 7, 1, 1, 0.5, 1.2),
-        clean("cgal/anchor_dense.off", 7, 1, 0, 0.5, 1.2),
-        clean("trimesh/cycloidal.ply", 8, 1, 0, 0.5, 1.2),
-        clean("geometry-central/spot.ply", 7, 1, 0, 0.5, 1.2),
-        clean("trimesh/featuretype.STL", 8, 1, 0, 0.5, 1.2),
+        clean("cgal/cheese.off", 9, 1, 133, 0.9, 2.0),
+        clean("topomender/meshfile.obj", 8, 1, 1, 0.9, 0.5),
+        clean("cgal/knot2.off", 7, 2, 2, 0.9, 0.5),
+        clean("cgal/anchor_dense.off", 7, 1, 4, 0.9, 0.9),
+        clean("geometry-central/spot.ply", 7, 1, 0, 0.5, 0.5),
+        clean("trimesh/featuretype.STL", 8, 1, 9, 0.5, 0.9),
+        clean("cgal/bones.off", 8, 1, 0, 0.9, 0.9),
+        clean("trimesh/fuze.ply", 8, 1, 0, 0.9, 0.9),
     ];
     let failures: Vec<String> = cases
         .iter()
