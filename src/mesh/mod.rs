@@ -6,6 +6,7 @@ pub mod sample;
 mod sets;
 mod star;
 mod stream;
+mod tally;
 mod validate;
 
 pub use polygon::triangulate;
