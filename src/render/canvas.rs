@@ -9,7 +9,7 @@ pub(super) const BACKGROUND: Vec3 = Vec3::new(0.90, 0.91, 0.93);
 const FRONT: Vec3 = Vec3::new(0.33, 0.45, 0.60);
 const BEHIND: Vec3 = Vec3::new(0.78, 0.13, 0.06);
 /// What is seen from behind must stand out in the dark, too.
-const BEHIND_GLOW: Vec3 = Vec3::new(0.10, 0.012, 0.006);
+const BEHIND_GLOW: Vec3 = Vec3::new(0.17, 0.018, 0.008);
 /// In samples: above the rounding of depths (1e-3 for 10,000 samples), below what can be seen.
 const BEHIND_SHIFT: f32 = 0.02;
 const WIRE: Vec3 = Vec3::new(0.02, 0.03, 0.05);
@@ -195,7 +195,7 @@ impl Canvas {
         self.samples.par_iter_mut().zip(&blurred).filter(|(sample, _)| sample.depth.is_finite()).for_each(
             |(sample, [depth, coverage])| {
                 let behind = (depth / coverage - sample.depth) / radius;
-                sample.light *= 1.0 - 0.55 * (0.25 * behind).clamp(0.0, 1.0);
+                sample.light *= 1.0 - 0.45 * (0.25 * behind).clamp(0.0, 1.0);
             },
         );
     }
