@@ -17,7 +17,7 @@ pub use validate::Violation;
 use glam::DVec3;
 
 /// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
-/// [`report`](crate::mesh) tells which.
+/// [`report`](Mesh::report) tells which.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// Positions in model units.

@@ -12,6 +12,8 @@ const BEHIND: Vec3 = Vec3::new(0.78, 0.13, 0.06);
 const BEHIND_GLOW: Vec3 = Vec3::new(0.17, 0.018, 0.008);
 /// In samples: above the rounding of depths (1e-3 for 10,000 samples), below what can be seen.
 const BEHIND_SHIFT: f32 = 0.02;
+/// Greatest part of a triangle's height that the line along an edge may take.
+const WIRE_SHARE: f32 = 0.08;
 const WIRE: Vec3 = Vec3::new(0.02, 0.03, 0.05);
 
 /// Light that a face sends to the eye, from its unit normal in camera axes (turned to the eye).
@@ -89,10 +91,11 @@ impl Patch {
         // it on its left, or above.
         let [dx, dy] = [0, 1].map(|k| sides.map(|[p, q]| i64::from(q[k]) - i64::from(p[k])));
         let bias: [i64; 3] = std::array::from_fn(|k| i64::from(dy[k] > 0 || (dy[k] == 0 && dx[k] > 0)));
-        let inverse_area = 1.0 / edge_function(a, b, c) as f32;
+        let area = edge_function(a, b, c) as f32;
+        // How much of a weight an edge's line takes: of small triangles a part only, or dense meshes would be black.
         let reach = sides.map(|[p, q]| {
             let side = [0, 1].map(|k| (q[k] - p[k]) as f32);
-            wire.map_or(0.0, |wire| wire * SUB as f32 * side[0].hypot(side[1]))
+            wire.map_or(0.0, |wire| (wire * SUB as f32 * side[0].hypot(side[1])).min(WIRE_SHARE * area))
         });
         for y in ys {
             let [px, py] = [xs.start, y].map(|i| (i * SUB + SUB / 2) as i32);
@@ -103,7 +106,7 @@ impl Patch {
                 if (0..3).all(|k| weights[k] >= bias[k]) {
                     entered = true;
                     let weight = weights.map(|w| w as f32);
-                    let depth = (0..3).map(|k| weight[k] * self.depth[k]).sum::<f32>() * inverse_area;
+                    let depth = (0..3).map(|k| weight[k] * self.depth[k]).sum::<f32>() / area;
                     if depth > sample.depth {
                         let on_wire = (0..3).any(|k| weight[k] < reach[k] && self.edges >> k & 1 == 1);
                         *sample = Sample { depth, light: if on_wire { WIRE } else { self.light } };
