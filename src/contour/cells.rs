@@ -115,13 +115,15 @@ impl<T: Copy> EdgeTable<T> {
         self.0[edge.index() >> 2][(x * SIDE + y) * SIDE + z + usize::from(EDGE_STEP[edge.index()])]
     }
 
-    /// Makes an entry for each crossing round the cells of a brick, from its axis and its number.
-    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(usize, u32) -> T) {
+    /// Makes an entry for each crossing round the cells of a brick, from its axis, its edge's start in the brick (0 ..= 8 each) and its
+    /// number.
+    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Axis, [u32; 3], u32) -> T) {
         let mut number = cells.brick.first;
         for (axis, plane) in cells.brick.crossed.iter().enumerate() {
             for (x, &word) in plane.0.iter().enumerate() {
                 for b in Bits(word) {
-                    self.0[axis][x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, number);
+                    self.0[axis][x * SIDE * SIDE + usize::from(AT[b as usize])] =
+                            entry(Axis::ALL[axis], [x as u32, b >> 3, b & 7], number);
                     number += 1;
                 }
             }
@@ -142,11 +144,11 @@ impl<T: Copy> EdgeTable<T> {
         &mut self,
         brick: &Brick,
         axes: &[usize],
-        [x0, y0, z0]: [usize; 3],
+        [x0, y0, z0]: [u32; 3],
         select: u64,
-        entry: &mut impl FnMut(usize, u32) -> T,
+        entry: &mut impl FnMut(Axis, [u32; 3], u32) -> T,
     ) {
-        let at = (x0 * SIDE + y0) * SIDE + z0;
+        let at = (x0 as usize * SIDE + y0 as usize) * SIDE + z0 as usize;
         let words = if x0 == 0 { 8 } else { 1 };
         let mut number = brick.first;
         for (axis, plane) in brick.crossed.iter().enumerate() {
@@ -155,7 +157,8 @@ impl<T: Copy> EdgeTable<T> {
                 for (x, &word) in plane.0[..words].iter().enumerate() {
                     for b in Bits(word & select) {
                         let below = (word & ((1 << b) - 1)).count_ones();
-                        self.0[axis][at + x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, before + below);
+                        self.0[axis][at + x * SIDE * SIDE + usize::from(AT[b as usize])] =
+                            entry(Axis::ALL[axis], [x0 + x as u32, y0 + (b >> 3), z0 + (b & 7)], before + below);
                     }
                     before += word.count_ones();
                 }

@@ -45,6 +45,7 @@ pub fn marching_cubes(
 }
 
 /// The number of triangles of the whole surface.
+#[inline(never)]
 fn count_triangles(octree: &SignedOctree) -> u64 {
     let of_brick = |i: usize| {
         let cells = Cells::new(octree, i);
@@ -58,6 +59,7 @@ fn count_triangles(octree: &SignedOctree) -> u64 {
     (4 * octree.crossings().len() as i64 + corrections) as u64
 }
 
+#[inline(never)]
 fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
     let bricks = &crossings.bricks()[range];
     let first = bricks.first().map_or(0, |b| b.first as usize);
@@ -78,13 +80,14 @@ fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec
     points
 }
 
+#[inline(never)]
 fn triangles_of(octree: &SignedOctree, numbers: &mut EdgeTable<u32>, range: Range<usize>) -> Vec<u32> {
     let bricks = &octree.crossings().bricks()[range.clone()];
     let crossed = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
     let mut corners = Vec::with_capacity(7 * crossed);
     for i in range {
         let cells = Cells::new(octree, i);
-        numbers.fill(&cells, |_, number| number);
+        numbers.fill(&cells, |_, _, number| number);
         for cell in cells.mixed().iter() {
             let case = &CASES[usize::from(cells.mask(cell))];
             for triangle in &case.triangles {

@@ -23,7 +23,7 @@ use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
 use crate::octree::crossings::{Brick, position, toward};
 use crate::progress::{Progress, Stage};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -99,11 +99,13 @@ pub fn dual_contouring(
     Ok(sizes)
 }
 
-/// A crossing as the cells beside it see it: position along the edge, and unit normal with the component along the edge positive.
+/// A crossing as the cells beside it see it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tangent {
-    position: f32,
-    normal: Vec3,
+    /// In cells from the least corner of the brick.
+    point: Vec3A,
+    /// Unit normal, its component along the edge positive.
+    normal: Vec3A,
 }
 
 /// A mixed cell whose vertices are not the ordinary single one.
@@ -260,6 +262,7 @@ impl<'a> Layout<'a> {
     }
 
     /// The points of the vertices of some bricks, and the planes of their cells with sharp features.
+    #[inline(never)]
     fn place_vertices(
         &self,
         frame: &Frame,
@@ -274,22 +277,22 @@ impl<'a> Layout<'a> {
         let mut planes = Vec::with_capacity(range.len());
         for i in range {
             let cells = Cells::new(self.octree, i);
-            table.fill(&cells, |axis, number| Tangent {
-                position: position(crossings.offsets()[number as usize]) as f32,
-                normal: match placement {
-                    Placement::SharpFeatures => {
-                        NormalCode(crossings.normals()[number as usize]).decode(Axis::ALL[axis]).as_vec3()
-                    }
-                    Placement::MassPoint => Vec3::ZERO,
-                },
+            table.fill(&cells, |axis, at, number| {
+                let mut point = Vec3A::from(at.map(|c| c as f32));
+                point[axis.index()] += position(crossings.offsets()[number as usize]) as f32;
+                let normal = match placement {
+                    Placement::SharpFeatures => NormalCode(crossings.normals()[number as usize]).decode(axis),
+                    Placement::MassPoint => Vec3A::ZERO,
+                };
+                Tangent { point, normal }
             });
             let origin = DVec3::from(crossings.origin(cells.brick()).map(f64::from));
             let mut sharp = Plane::EMPTY;
             for cell in cells.mixed().iter() {
-                let corner = origin + DVec3::from(cell.coords().map(f64::from));
-                let mask = cells.mask(cell);
-                let tangents = |edge: Edge| table.get(cell, edge);
-                let is_sharp = place_in_cell(mask, placement, tangents, |p| points.push(frame.to_model(corner + p)));
+                let tangent = |edge: Edge| table.get(cell, edge);
+                let is_sharp = place_in_cell(cell, cells.mask(cell), placement, tangent, |p| {
+                    points.push(frame.to_model(origin + p.as_dvec3()));
+                });
                 if is_sharp {
                     sharp.set(cell);
                 }
@@ -299,6 +302,7 @@ impl<'a> Layout<'a> {
         (points, planes)
     }
 
+    #[inline(never)]
     fn faces(
         &self,
         sharp: &[Plane],
@@ -359,43 +363,39 @@ fn middle(points: &[DVec3]) -> DVec3 {
 }
 
 /// Vertices keep this distance from the sides of their cell, in cells.
-const CELL_MARGIN: f64 = 1.0 / 1024.0;
+const CELL_MARGIN: f32 = 1.0 / 1024.0;
 
 /// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
-const CREASED: f64 = 0.933;
+const CREASED: f32 = 0.933;
 
-/// Calls `place` with the vertices of a cell, in cells from its least corner. Returns whether the cell has a crease or corner.
+/// Calls `place` with the vertices of a cell, in cells from the least corner of its brick. Returns whether it has a crease or corner.
 #[inline]
 fn place_in_cell(
+    cell: Local,
     mask: Mask,
     placement: Placement,
     tangent: impl Fn(Edge) -> Tangent,
-    mut place: impl FnMut(DVec3),
+    mut place: impl FnMut(Vec3A),
 ) -> bool {
     let case = &CASES[usize::from(mask)];
-    let crossing = |edge: Edge| {
-        let start = edge.corners()[0];
-        let t = tangent(edge);
-        let mut p = Axis::ALL.map(|a| f64::from(u8::from(start & a)));
-        p[edge.axis().index()] = f64::from(t.position);
-        let n = t.normal.as_dvec3();
-        // Outward: from the inside end to the other.
-        (DVec3::from(p), if mask >> start.index() & 1 == 1 { n } else { -n })
+    let corner = Vec3A::from(cell.coords().map(|c| c as f32));
+    // Tangents point away from the low end of their edge.
+    let add = |qef: &mut Qef, edge: Edge| {
+        let Tangent { point, normal } = tangent(edge);
+        let outward = if mask >> edge.corners()[0].index() & 1 == 1 { normal } else { -normal };
+        qef.add(point - corner, outward);
     };
     let solve = |qef: &Qef| {
         let p = match placement {
             Placement::SharpFeatures => qef.minimiser(),
             Placement::MassPoint => qef.mass_point(),
         };
-        p.clamp(DVec3::splat(CELL_MARGIN), DVec3::splat(1.0 - CELL_MARGIN))
+        corner + p.clamp(Vec3A::splat(CELL_MARGIN), Vec3A::splat(1.0 - CELL_MARGIN))
     };
     let creased = |qef: &Qef| placement == Placement::SharpFeatures && qef.flatness() < CREASED;
-    if let ([cycle], true) = (&case.cycles[..], case.sheets.vertices == 1) {
+    if let ([cycle], 1) = (&case.cycles[..], case.sheets.vertices) {
         let mut qef = Qef::default();
-        cycle.iter().for_each(|&edge| {
-            let (p, n) = crossing(edge);
-            qef.add(p, n);
-        });
+        cycle.iter().for_each(|&edge| add(&mut qef, edge));
         place(solve(&qef));
         return creased(&qef);
     }
@@ -406,7 +406,7 @@ fn place_in_cell(
             let sheet_of = |edge| case.sheets.sheet[inside_end(mask, edge).index()];
             case.cycles.iter().flatten().copied().filter(move |&edge| sheet_of(edge) == sheet)
         };
-        of_sheet().map(&crossing).for_each(|(p, n)| qef.add(p, n));
+        of_sheet().for_each(|edge| add(&mut qef, edge));
         let common = solve(&qef);
         sharp |= creased(&qef);
         if case.sheets.is_regular(sheet) {
@@ -414,11 +414,11 @@ fn place_in_cell(
             continue;
         }
         // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.
-        for corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
-            let around: Vec<DVec3> =
-                of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| crossing(e).0).collect();
-            let own =
-                if around.is_empty() { middle(&[point([0; 3], corner), DVec3::splat(0.5)]) } else { middle(&around) };
+        for of_corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
+            let around = of_sheet().filter(|&e| inside_end(mask, e) == of_corner).map(|e| tangent(e).point);
+            let (n, sum) = around.fold((0.0, Vec3A::ZERO), |(n, sum), p| (n + 1.0, sum + p));
+            let between = corner + 0.25 + 0.5 * point([0; 3], of_corner).as_vec3a();
+            let own = if n > 0.0 { sum / n } else { between };
             place(own.lerp(common, 0.25));
         }
     }
