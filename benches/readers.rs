@@ -64,13 +64,15 @@ fn readers(criterion: &mut Criterion) {
         io::write(&path, &mesh, options).expect("written");
         let bytes = std::fs::read(&path).expect("readable");
         let mut group = group(criterion, &format!("read {name}"), bytes.len() as u64);
-        group.bench_function("read_bytes", |b| b.iter(|| io::read_bytes(name, black_box(&bytes), None).expect("valid")));
+        group
+            .bench_function("read_bytes", |b| b.iter(|| io::read_bytes(name, black_box(&bytes), None).expect("valid")));
         if !options.is_text && matches!(Format::from_path(&path), Some(Format::Stl | Format::Ply)) {
             group.bench_function("open, triangles", |b| b.iter(|| sum(&mut io::open(&path).expect("valid"))));
         }
         match name {
             "stl" => {
-                let triangles = |bytes| stl_io::create_stl_reader(&mut Cursor::new(bytes)).expect("valid").flatten().count();
+                let triangles =
+                    |bytes| stl_io::create_stl_reader(&mut Cursor::new(bytes)).expect("valid").flatten().count();
                 group.bench_function("stl_io, triangles", |b| b.iter(|| triangles(black_box(&bytes))));
                 group.bench_function("stl_io, welded", |b| {
                     b.iter(|| stl_io::read_stl(&mut Cursor::new(black_box(&bytes))).expect("valid"));
@@ -109,7 +111,8 @@ fn writers(criterion: &mut Criterion) {
     // Faces alone: what a repair writes most of.
     let mut group = group(criterion, "write", 13 * sizes.faces);
     let mut writer = io::create(Path::new("/dev/null"), Format::Ply, WriteOptions::default()).expect("opened");
-    group.bench_function("ply faces", |b| b.iter(|| writer.faces(3, black_box(mesh.faces.corners())).expect("written")));
+    group
+        .bench_function("ply faces", |b| b.iter(|| writer.faces(3, black_box(mesh.faces.corners())).expect("written")));
 }
 
 criterion_group!(benches, readers, writers);

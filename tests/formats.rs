@@ -20,7 +20,8 @@ fn samples() -> Option<PathBuf> {
 /// All files below a directory, sorted.
 fn files(directory: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(directory).expect("a directory").map(|entry| entry.expect("an entry").path());
-    let mut found: Vec<PathBuf> = entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect();
+    let mut found: Vec<PathBuf> =
+        entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect();
     found.sort();
     found
 }
@@ -276,7 +277,8 @@ fn ply_agrees_with_ply_rs() {
         Property::Double(x) => x,
         ref other => panic!("{other:?}"),
     };
-    let indices = |element: &DefaultElement| match element.get("vertex_indices").or_else(|| element.get("vertex_index")) {
+    let indices = |element: &DefaultElement| match element.get("vertex_indices").or_else(|| element.get("vertex_index"))
+    {
         Some(Property::ListInt(list)) => list.iter().map(|&i| i as u32).collect::<Vec<u32>>(),
         Some(Property::ListUInt(list)) => list.clone(),
         other => panic!("{other:?}"),
@@ -323,7 +325,8 @@ fn inputs_that_cannot_be_opened_say_why() {
 fn content_counts_not_names() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("cube.ply");
-    io::write(&path, &cube(), WriteOptions { precision: Precision::Double, ..WriteOptions::default() }).expect("written");
+    io::write(&path, &cube(), WriteOptions { precision: Precision::Double, ..WriteOptions::default() })
+        .expect("written");
     let misnamed = directory.path().join("cube.stl");
     std::fs::rename(&path, &misnamed).expect("renamed");
     assert_eq!(io::read(&misnamed).expect("readable"), cube());

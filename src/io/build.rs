@@ -112,7 +112,8 @@ mod tests {
         let mut welder = Welder::new();
         for round in 0..2 {
             for i in 0..1000 {
-                let index = welder.index(&mut builder, DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.5)).expect("few");
+                let index =
+                    welder.index(&mut builder, DVec3::new(f64::from(i % 10), f64::from(i / 10), 0.5)).expect("few");
                 assert_eq!(index, i as u32, "round {round}");
             }
         }

@@ -111,7 +111,10 @@ mod tests {
 
     #[test]
     fn short_faces_are_kept_and_faces_may_come_first() {
-        assert_eq!(faces(&format!("f\nf 1\nf 1 2 4\n{POINTS}f")).expect("valid"), [vec![], vec![0], vec![0, 1, 3], vec![]]);
+        assert_eq!(
+            faces(&format!("f\nf 1\nf 1 2 4\n{POINTS}f")).expect("valid"),
+            [vec![], vec![0], vec![0, 1, 3], vec![]]
+        );
     }
 
     #[test]

@@ -54,7 +54,11 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Parsed> {
                 polygon.push(index as u32);
             } else {
                 let problem = format!("face {i} refers to vertex {index}, but there are {points}");
-                return Err(text.error_at(start, problem, "OFF counts vertices from 0: correct the face or export again"));
+                return Err(text.error_at(
+                    start,
+                    problem,
+                    "OFF counts vertices from 0: correct the face or export again",
+                ));
             }
         }
         builder.polygon(&polygon)?;
@@ -89,8 +93,13 @@ fn parse_header(text: &mut Text<'_>) -> Result<(u64, u64)> {
     let (points, polygons) = counts;
     let least = points.saturating_mul(6).saturating_add(polygons.saturating_mul(2));
     if least > text.rest().len() as u64 + 1 {
-        let problem = format!("{points} vertices and {polygons} faces are promised, but only {} bytes follow", text.rest().len());
-        return Err(text.error_at(text.position().saturating_sub(1), problem, "correct the counts or export the file again"));
+        let problem =
+            format!("{points} vertices and {polygons} faces are promised, but only {} bytes follow", text.rest().len());
+        return Err(text.error_at(
+            text.position().saturating_sub(1),
+            problem,
+            "correct the counts or export the file again",
+        ));
     }
     Ok(counts)
 }
@@ -108,7 +117,9 @@ mod tests {
 
     #[test]
     fn headers_come_in_all_forms() {
-        for header in ["OFF\n3 1 0\n", "OFF 3 1 0\n", "OFF3 1 2\n", "3 1 0\n", "# c\n\nCOFF\n# c\n3 1\n", "STCNOFF\r\n3 1 9\r\n"] {
+        for header in
+            ["OFF\n3 1 0\n", "OFF 3 1 0\n", "OFF3 1 2\n", "3 1 0\n", "# c\n\nCOFF\n# c\n3 1\n", "STCNOFF\r\n3 1 9\r\n"]
+        {
             assert_eq!(read(&format!("{header}{REST}")).expect(header), (3, vec![vec![0, 1, 2]]));
         }
         assert!(keyword(b"OFFSET").is_none() && keyword(b"STOFF ").is_some());
@@ -123,7 +134,10 @@ mod tests {
         assert!(message("OFF\n9999999999 1 0\n0 0 0\n").starts_with("t.off: line 2: 9999999999 vertices"));
         assert!(message("OFF\n-3 1 0\n").contains("line 2: the number of vertices is -3"));
         assert!(message("").contains("expected `OFF`"));
-        assert!(message(&format!("OFF\n3 2 0\n{REST}")).contains("expected the number of corners of face 1 of 2, but the file ends here"));
+        assert!(
+            message(&format!("OFF\n3 2 0\n{REST}"))
+                .contains("expected the number of corners of face 1 of 2, but the file ends here")
+        );
         assert!(message("OFF\n1 1 0\n0 0 0\n3 0 0 1\n").contains("line 4: face 0 refers to vertex 1, but there are 1"));
         assert!(message("OFF\n1 1 0\n0 0 0\n3 0 0").contains("expected a vertex index, but the file ends here"));
         assert!(message("OFF\n1 0 0\n0 0 zero\n").contains("expected a coordinate of vertex 0 of 1, found `zero`"));

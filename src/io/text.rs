@@ -118,7 +118,8 @@ impl<'a> Text<'a> {
     }
 
     /// Takes what `scan` finds under the cursor.
-    fn take<T>(&mut self, scan: fn(&[u8]) -> Option<(T, usize)>, what: impl Display) -> Result<T> {
+    #[inline]
+    fn take<T>(&mut self, scan: impl Fn(&[u8]) -> Option<(T, usize)>, what: impl Display) -> Result<T> {
         let rest = self.rest();
         match scan(rest) {
             Some((value, length)) if rest.get(length).is_none_or(|&b| is_delimiter(b)) => {
@@ -191,7 +192,8 @@ fn line_length(bytes: &[u8]) -> usize {
     /// Wide enough for the search to be vectorised.
     const BLOCK: usize = 32;
     let is_end = |b: &u8| *b == b'\n' || *b == b'\r';
-    let clear = bytes.chunks_exact(BLOCK).take_while(|block| !block.iter().fold(false, |any, b| any | is_end(b))).count();
+    let clear =
+        bytes.chunks_exact(BLOCK).take_while(|block| !block.iter().fold(false, |any, b| any | is_end(b))).count();
     let start = clear * BLOCK;
     bytes[start..].iter().position(is_end).map_or(bytes.len(), |length| start + length)
 }

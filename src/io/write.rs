@@ -1,10 +1,10 @@
 //! Writing meshes to files, whole or as they are made.
 
+use super::Format;
 use super::encode::{Encoder, LineEncoder, Out, Precision};
 use super::file::AtomicFile;
 use super::ply::PlyEncoder;
 use super::stl::StlEncoder;
-use super::Format;
 use crate::error::{Error, Place, Result};
 use crate::mesh::{Mesh, MeshSink, MeshSizes};
 use glam::{DVec3, Vec3};
@@ -220,10 +220,14 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let begin = |name: &str, sizes| {
             let path = directory.path().join(name);
-            create(&path, Format::from_path(&path).expect("known"), WriteOptions::default()).expect("created").begin(sizes)
+            create(&path, Format::from_path(&path).expect("known"), WriteOptions::default())
+                .expect("created")
+                .begin(sizes)
         };
         let sizes = MeshSizes { points: 0, faces: 1 << 32, corners: 3 << 32 };
-        assert!(begin("a.stl", sizes).expect_err("2^32").to_string().contains("binary STL can count 4294967295 at most"));
+        assert!(
+            begin("a.stl", sizes).expect_err("2^32").to_string().contains("binary STL can count 4294967295 at most")
+        );
         assert!(begin("a.ply", sizes).is_ok());
         let mut writer = create(directory.path().join("b.ply"), Format::Ply, WriteOptions::default()).expect("created");
         assert!(writer.faces(256, &[0; 256]).is_err());

@@ -8,6 +8,9 @@ use glam::DVec3;
 use std::io::Read;
 use std::marker::PhantomData;
 
+/// Stands in a strip between two strips.
+const RESTART: f64 = -1.0;
+
 const CUT_SHORT: &str = "the file is cut short or its header wrong: copy or export it again";
 
 /// A source of values in the order of the file. All types are passed as `f64`, which holds every index exactly.
@@ -49,7 +52,9 @@ pub(super) trait Body {
         let length = self.value(count, element)?;
         if length < 0.0 || length.fract() != 0.0 || length * self.least_size(item) as f64 > (self.left() + 1) as f64 {
             let (name, left) = (&element.name, self.left());
-            return Err(self.error(format!("`{name}` has a list with {length} entries, but {left} bytes are left"), CUT_SHORT));
+            return Err(
+                self.error(format!("`{name}` has a list with {length} entries, but {left} bytes are left"), CUT_SHORT)
+            );
         }
         Ok(length as u64)
     }
@@ -114,11 +119,7 @@ pub(super) trait Body {
     }
 
     /// Calls `visit` with the list of vertex indices of each record as it is, and the number of the record.
-    fn lists(
-        &mut self,
-        element: &Element,
-        mut visit: impl FnMut(&mut Self, u64, &[f64]) -> Result<()>,
-    ) -> Result<()> {
+    fn lists(&mut self, element: &Element, mut visit: impl FnMut(&mut Self, u64, &[f64]) -> Result<()>) -> Result<()> {
         if element.count == 0 {
             return Ok(());
         }
@@ -159,14 +160,9 @@ pub(super) trait Body {
 
     /// Calls `visit` with the triangles of each strip; -1 begins a strip anew. Triangles that only turn a corner have
     /// two equal vertices and are left out.
-    fn strips(
-        &mut self,
-        element: &Element,
-        points: u64,
-        mut visit: impl FnMut([u32; 3]) -> Result<()>,
-    ) -> Result<()> {
+    fn strips(&mut self, element: &Element, points: u64, mut visit: impl FnMut([u32; 3]) -> Result<()>) -> Result<()> {
         self.lists(element, |body, record, list| {
-            for strip in list.split(|&index| index == -1.0) {
+            for strip in list.split(|index| index.to_bits() == RESTART.to_bits()) {
                 for (i, window) in strip.windows(3).enumerate() {
                     let mut corner = |k: usize| body.index(element, record, window[k], points);
                     let (a, b, c) = (corner(0)?, corner(1)?, corner(2)?);
@@ -281,7 +277,9 @@ impl<'a, O: Order, R: Read> Binary<'a, O, R> {
         let mut left = element.count;
         while left > 0 {
             let mut records = 0;
-            for record in self.bytes.fill(stride)?.chunks_exact(stride).take(usize::try_from(left).unwrap_or(usize::MAX)) {
+            for record in
+                self.bytes.fill(stride)?.chunks_exact(stride).take(usize::try_from(left).unwrap_or(usize::MAX))
+            {
                 let value = |at: usize| decode(O::little(chunk(record, at)));
                 visit(DVec3::new(value(x), value(y), value(z)))?;
                 records += 1;

@@ -90,7 +90,8 @@ impl Scalar {
 impl Element {
     /// The positions of the properties `x`, `y`, `z`, or the first one that is missing.
     pub(super) fn coordinates(&self) -> Result<[usize; 3], &'static str> {
-        let find = |name| self.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_))).ok_or(name);
+        let find =
+            |name| self.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_))).ok_or(name);
         Ok([find("x")?, find("y")?, find("z")?])
     }
 
@@ -244,7 +245,8 @@ mod tests {
 
     #[test]
     fn errors_name_the_line() {
-        let message = |line: &str| Header::parse("t.ply", format!("ply\n{line}").as_bytes()).expect_err(line).to_string();
+        let message =
+            |line: &str| Header::parse("t.ply", format!("ply\n{line}").as_bytes()).expect_err(line).to_string();
         assert!(message("property float x\n").contains("line 2: property `x` stands before any element"));
         assert!(message("format binary 1.0\n").contains("line 2: expected `ascii`, "));
         assert!(message("element vertex many\n").contains("expected the number of `vertex`, found `many`"));

@@ -22,7 +22,12 @@ impl PlyEncoder {
 }
 
 /// The header of a PLY file.
-pub(in crate::io) fn write_header(encoding: &str, sizes: MeshSizes, precision: Precision, has_short_faces: bool) -> String {
+pub(in crate::io) fn write_header(
+    encoding: &str,
+    sizes: MeshSizes,
+    precision: Precision,
+    has_short_faces: bool,
+) -> String {
     let float = if precision == Precision::Single { "float" } else { "double" };
     let count = if has_short_faces { "uchar" } else { "uint" };
     let index = if sizes.points <= 1 << 31 { "int" } else { "uint" };
@@ -52,7 +57,7 @@ impl Encoder for PlyEncoder {
             }
             Precision::Double => {
                 let (rooms, _) = out.room(24 * points.len()).as_chunks_mut::<8>();
-                let values = points.iter().flat_map(|point| point.to_array());
+                let values = points.iter().flat_map(DVec3::to_array);
                 rooms.iter_mut().zip(values).for_each(|(room, value)| *room = value.to_le_bytes());
                 out.advance(24 * points.len());
             }

@@ -173,8 +173,10 @@ impl Solids {
         let whole = left / RECORD as u64;
         let promised = triangles_in(&header);
         if self.solids.is_empty() || (self.triangles() == 0 && whole > 0 && self.trailing_bytes > 0) {
-            let problem = format!("the header promises {promised} triangles, but {left} bytes with {whole} triangles follow");
-            let remedy = format!("copy or export the file again, or set the count at byte 80 to {whole} to use what is there");
+            let problem =
+                format!("the header promises {promised} triangles, but {left} bytes with {whole} triangles follow");
+            let remedy =
+                format!("copy or export the file again, or set the count at byte 80 to {whole} to use what is there");
             return Err(Error::format(name, Place::Byte(80), problem, remedy));
         }
         Ok(())
@@ -202,7 +204,9 @@ impl Solids {
                     visit(corners(record))?;
                 }
                 if consumed == 0 {
-                    return Err(bytes.error("the file shrinks while it is read", "wait until it is written, then try again"));
+                    return Err(
+                        bytes.error("the file shrinks while it is read", "wait until it is written, then try again")
+                    );
                 }
                 bytes.consume(consumed);
             }
@@ -255,7 +259,9 @@ impl TriangleSource for StlFile {
         }
         let mut bounds = Bounds::EMPTY;
         self.visit(|triangle| {
-            triangle.into_iter().for_each(|corner| bounds.add(corner));
+            for corner in triangle {
+                bounds.add(corner);
+            }
             Ok(())
         })?;
         self.bounds = Some(bounds);
@@ -278,7 +284,8 @@ mod tests {
     use super::*;
     use crate::mesh::Mesh;
 
-    const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 -0\nendloop\nendfacet\n";
+    const FACET: &str =
+        "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 -0\nendloop\nendfacet\n";
 
     fn text(text: &str) -> Result<Mesh> {
         assert!(is_text(text.as_bytes(), text.len() as u64), "{text}");
