@@ -123,7 +123,7 @@ impl<T: Copy> EdgeTable<T> {
             for (x, &word) in plane.0.iter().enumerate() {
                 for b in Bits(word) {
                     self.0[axis][x * SIDE * SIDE + usize::from(AT[b as usize])] =
-                            entry(Axis::ALL[axis], [x as u32, b >> 3, b & 7], number);
+                        entry(Axis::ALL[axis], [x as u32, b >> 3, b & 7], number);
                     number += 1;
                 }
             }

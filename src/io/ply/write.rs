@@ -57,7 +57,7 @@ impl Encoder for PlyEncoder {
             }
             Precision::Double => {
                 let (rooms, _) = out.room(24 * points.len()).as_chunks_mut::<8>();
-                let values = points.iter().flat_map(|point| point.to_array());
+                let values = points.iter().flat_map(DVec3::to_array);
                 rooms.iter_mut().zip(values).for_each(|(room, value)| *room = value.to_le_bytes());
                 out.advance(24 * points.len());
             }
