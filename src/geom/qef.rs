@@ -5,55 +5,48 @@
 //! mass point (Tikhonov). Where the planes say nothing the result is the mass point's projection, as with the cut-off; where they
 //! do, it is moved by the factor penalty / singular value: continuous in the input, and a closed formula.
 
-use glam::{Mat3A, Vec3A};
+use glam::{Vec3A, Vec4};
+use std::ops::AddAssign;
 
 /// Weight of the distance from the mass point, relative to one plane. Normals are stored to within 0.6 degrees, which on a flat piece
 /// looks like a singular value of up to (0.01)^2 = 1e-4 a plane; a crease of 30 degrees has 2e-2, one of 90 degrees 0.5. 1e-3 lies
 /// between: it damps the noise to a tenth, and pulls the crease of 90 degrees in by 0.2 percent of the way to the mass point.
 const PENALTY: f32 = 1e-3;
 
-/// Tangent planes seen so far. In single precision: 1e-7 is far below the penalty.
+/// The sum of the squared distances to some planes. Functions are added by adding them: a crossing makes one, and every cell beside
+/// it adds it to its own. Coordinates up to 8 keep rounding (1e-6) far below the penalty.
 #[derive(Debug, Clone, Copy)]
 pub struct Qef {
-    /// Sum of n n^T.
-    products: Mat3A,
-    /// Sum of n (n . p).
-    moments: Vec3A,
-    points: Vec3A,
-    normals: Vec3A,
-    count: f32,
-}
-
-impl Default for Qef {
-    fn default() -> Self {
-        let zero = Vec3A::ZERO;
-        Qef { products: Mat3A::ZERO, moments: zero, points: zero, normals: zero, count: 0.0 }
-    }
+    /// Rows of the sum of n n^T, and n.
+    rows: [Vec4; 3],
+    /// Sum of n (n . p); the last is not used.
+    moments: Vec4,
+    /// Sum of p, and the number of planes.
+    points: Vec4,
 }
 
 impl Qef {
-    /// Adds the plane through `p` with unit normal `n`. Take coordinates near 0: precision is relative to them.
+    /// No plane.
+    pub const EMPTY: Qef = Qef { rows: [Vec4::ZERO; 3], moments: Vec4::ZERO, points: Vec4::ZERO };
+
+    /// The plane through `p` with unit normal `n`.
     #[inline]
-    pub fn add(&mut self, p: Vec3A, n: Vec3A) {
-        self.products.x_axis += n * n.x;
-        self.products.y_axis += n * n.y;
-        self.products.z_axis += n * n.z;
-        self.moments += n * n.dot(p);
-        self.points += p;
-        self.normals += n;
-        self.count += 1.0;
+    pub fn of_plane(p: Vec3A, n: Vec3A) -> Qef {
+        let normal = Vec4::from((n, 1.0));
+        Qef { rows: [normal * n.x, normal * n.y, normal * n.z], moments: normal * n.dot(p), points: Vec4::from((p, 1.0)) }
     }
 
     /// Mean of the points. There must be at least one.
     #[inline]
     pub fn mass_point(&self) -> Vec3A {
-        self.points / self.count
+        Vec3A::from_vec4(self.points) / self.points.w
     }
 
     /// Squared length of the mean normal, for normals that all point outward: 1 on a flat piece, 1/2 at a crease of 90 degrees.
     #[inline]
     pub fn flatness(&self) -> f32 {
-        self.normals.length_squared() / (self.count * self.count)
+        let [x, y, z] = self.rows.map(|row| row.w);
+        (x * x + y * y + z * z) / (self.points.w * self.points.w)
     }
 
     /// The point with the least sum of squared distances to the planes, and to the mass point with a weight of one in a thousand.
@@ -61,15 +54,23 @@ impl Qef {
     #[inline]
     pub fn minimiser(&self) -> Vec3A {
         let mass = self.mass_point();
-        let residual = self.moments - self.products * mass;
-        // Solve (products + penalty) d = residual by cofactors: the matrix is symmetric, and positive thanks to the penalty.
-        let penalty = PENALTY * self.count;
-        let a = self.products.x_axis + Vec3A::X * penalty;
-        let b = self.products.y_axis + Vec3A::Y * penalty;
-        let c = self.products.z_axis + Vec3A::Z * penalty;
+        let [x, y, z] = self.rows.map(Vec3A::from_vec4);
+        let residual = Vec3A::from_vec4(self.moments) - (x * mass.x + y * mass.y + z * mass.z);
+        // Solve (n n^T + penalty) d = residual by cofactors: the matrix is symmetric, and positive thanks to the penalty.
+        let penalty = PENALTY * self.points.w;
+        let (a, b, c) = (x + Vec3A::X * penalty, y + Vec3A::Y * penalty, z + Vec3A::Z * penalty);
         let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
         let step = bc * residual.x + ca * residual.y + ab * residual.z;
         mass + step / a.dot(bc)
+    }
+}
+
+impl AddAssign<&Qef> for Qef {
+    #[inline]
+    fn add_assign(&mut self, other: &Qef) {
+        self.rows.iter_mut().zip(other.rows).for_each(|(row, other)| *row += other);
+        self.moments += other.moments;
+        self.points += other.points;
     }
 }
 
@@ -78,8 +79,8 @@ mod tests {
     use super::*;
 
     fn qef(planes: &[([f32; 3], [f32; 3])]) -> Qef {
-        let mut q = Qef::default();
-        planes.iter().for_each(|(p, n)| q.add(Vec3A::from(*p), Vec3A::from(*n).normalize()));
+        let mut q = Qef::EMPTY;
+        planes.iter().for_each(|(p, n)| q += &Qef::of_plane(Vec3A::from(*p), Vec3A::from(*n).normalize()));
         q
     }
 
