@@ -70,6 +70,25 @@ impl<'a> Cells<'a> {
         diagonals.iter().fold(ambiguous, |a, (at, others)| a | (all(at) & none(others)))
     }
 
+    /// Calls `each` with every mixed cell and its corners that are inside.
+    #[inline]
+    pub(super) fn for_mixed(&self, mut each: impl FnMut(Local, Mask)) {
+        let mixed = self.mixed();
+        for x in 0..8 {
+            let mut word = mixed.0[x];
+            while word != 0 {
+                // Eight cells along z: their bits in eight planes are eight masks, transposed.
+                let row = word.trailing_zeros() & !7;
+                let bits = self.corners.map(|plane| (plane.0[x] >> row) as u8);
+                let masks = transposed(u64::from_le_bytes(bits)).to_le_bytes();
+                for z in Bits(word >> row & 0xff) {
+                    each(Local::from_index(x as u32 * 64 + row + z), masks[z as usize]);
+                }
+                word &= !(0xff << row);
+            }
+        }
+    }
+
     /// The corners of a cell that are inside.
     #[inline]
     pub(super) fn mask(&self, cell: Local) -> Mask {
@@ -78,17 +97,18 @@ impl<'a> Cells<'a> {
         self.corners.iter().enumerate().fold(0, |mask, (i, plane)| mask | ((plane.0[x as usize] >> bit & 1) as u8) << i)
     }
 
-    /// Whether a lattice point of the brick or the layer after it (0 ..= 8 each) is inside.
-    #[inline]
-    pub(super) fn is_inside(&self, at: [u32; 3]) -> bool {
-        let [x, y, z] = at.map(|c| (c.min(7), c >> 3));
-        let corner = (x.1 << 2 | y.1 << 1 | z.1) as usize;
-        self.corners[corner].get(Local::new(x.0, y.0, z.0))
-    }
-
     pub(super) fn brick(&self) -> &'a Brick {
         self.brick
     }
+}
+
+/// The transposed matrix of 8 x 8 bits, a row in each byte (Warren, Hacker's Delight, 7-3).
+fn transposed(mut bits: u64) -> u64 {
+    for (distance, mask) in [(7, 0x00aa_00aa_00aa_00aa), (14, 0x0000_cccc_0000_cccc), (28, 0x0000_0000_f0f0_f0f0)] {
+        let swap = (bits ^ bits >> distance) & mask;
+        bits ^= swap ^ swap << distance;
+    }
+    bits
 }
 
 /// Positions a side of the table: a brick and the next layer.
@@ -97,6 +117,18 @@ const SIDE: usize = 9;
 const LAYER: usize = SIDE * SIDE * SIDE;
 /// Entries before a position's for one step along each axis.
 const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
+
+/// A crossed edge as a brick sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    pub(super) axis: Axis,
+    /// Its start, in cells from the least corner of the brick, 0 ..= 8 each.
+    pub(super) start: [u32; 3],
+    /// Its place in the arrays of the octree.
+    pub(super) number: u32,
+    /// Whether its start is inside, and so its end outside.
+    pub(super) starts_inside: bool,
+}
 
 /// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale.
 pub(super) struct EdgeTable<T>(Box<[T; 3 * LAYER]>);
@@ -145,18 +177,19 @@ impl<T: Copy> EdgeTable<T> {
         move |edge| entries[usize::from(EDGE_AT[edge.index()])]
     }
 
-    /// Makes an entry for each crossing round the cells of a brick, from its axis, its edge's start in the brick (0 ..= 8 each) and its
-    /// number.
+    /// Makes an entry for each crossing round the cells of a brick.
     #[inline]
-    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Axis, [u32; 3], u32) -> T) {
+    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Crossing) -> T) {
         const LOW_Y: u64 = 0xff;
         const LOW_Z: u64 = 0x0101_0101_0101_0101;
         let mut number = cells.brick.first;
         for (axis, plane) in Axis::ALL.into_iter().zip(&cells.brick.crossed) {
             for (x, &word) in plane.0.iter().enumerate() {
+                let inside = cells.corners[0].0[x];
                 for b in Bits(word) {
+                    let start = [x as u32, b >> 3, b & 7];
                     self.0[axis.index() * LAYER + x * STEP[0] + usize::from(AT[b as usize])] =
-                        entry(axis, [x as u32, b >> 3, b & 7], number);
+                        entry(Crossing { axis, start, number, starts_inside: inside >> b & 1 == 1 });
                     number += 1;
                 }
             }
@@ -171,7 +204,7 @@ impl<T: Copy> EdgeTable<T> {
             (pyz, &[Axis::X], [0, 8, 8], LOW_Y & LOW_Z),
         ] {
             for &axis in axes {
-                self.fill_layer(brick, axis, start, select, &mut entry);
+                self.fill_layer(brick, &cells.corners, axis, start, select, &mut entry);
             }
         }
     }
@@ -181,10 +214,11 @@ impl<T: Copy> EdgeTable<T> {
     fn fill_layer(
         &mut self,
         brick: &Brick,
+        corners: &[Plane; 8],
         axis: Axis,
         start: [u32; 3],
         select: u64,
-        entry: &mut impl FnMut(Axis, [u32; 3], u32) -> T,
+        entry: &mut impl FnMut(Crossing) -> T,
     ) {
         let [x0, y0, z0] = start.map(|c| c as usize);
         let at = axis.index() * LAYER + x0 * STEP[0] + y0 * STEP[1] + z0;
@@ -192,14 +226,36 @@ impl<T: Copy> EdgeTable<T> {
         if words.iter().all(|word| word & select == 0) {
             return;
         }
+        // The layer's points are corners of the brick's last cells: which corners, and how far on their bits are.
+        let [high_x, high_y, high_z] = start.map(|c| c >> 3);
+        let corner = &corners[(high_x << 2 | high_y << 1 | high_z) as usize];
+        let last = 56 * high_y + 7 * high_z;
         let mut before = brick.first + brick.crossed[..axis.index()].iter().map(Plane::count).sum::<u32>();
         for (x, &word) in words.iter().enumerate() {
+            let inside = corner.0[if high_x == 1 { 7 } else { x }] >> last;
             for b in Bits(word & select) {
                 let number = before + (word & ((1 << b) - 1)).count_ones();
-                let from = [start[0] + x as u32, start[1] + (b >> 3), start[2] + (b & 7)];
-                self.0[at + x * STEP[0] + usize::from(AT[b as usize])] = entry(axis, from, number);
+                let start = [start[0] + x as u32, start[1] + (b >> 3), start[2] + (b & 7)];
+                self.0[at + x * STEP[0] + usize::from(AT[b as usize])] =
+                    entry(Crossing { axis, start, number, starts_inside: inside >> b & 1 == 1 });
             }
             before += word.count_ones();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn transposing_swaps_rows_and_columns(bits: u64) {
+            let transposed = transposed(bits);
+            for (i, j) in (0..8).flat_map(|i| (0..8).map(move |j| (i, j))) {
+                prop_assert_eq!(bits >> (8 * i + j) & 1, transposed >> (8 * j + i) & 1);
+            }
         }
     }
 }

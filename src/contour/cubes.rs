@@ -84,15 +84,16 @@ fn count_triangles(octree: &SignedOctree) -> u64 {
 fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
     let places = crossings.places(range.clone());
     let mut points = Vec::with_capacity(places.len());
-    let mut offsets = crossings.offsets().range(places);
+    let mut place = places.start;
     for brick in range.map(|i| &crossings.bricks()[i]) {
         let origin = DVec3::from(crossings.origin(brick).map(f64::from));
         for (axis, plane) in brick.crossed.iter().enumerate() {
             let along = DVec3::AXES[axis];
             plane.iter().for_each(|local| {
                 let [x, y, z] = local.coords().map(f64::from);
-                let offset = position(*offsets.next().expect("one offset a crossing"));
+                let offset = position(crossings.offsets()[place]);
                 points.push(frame.to_model(origin + DVec3::new(x, y, z) + along * offset));
+                place += 1;
             });
         }
     }
@@ -105,11 +106,11 @@ fn triangles_of(octree: &SignedOctree, numbers: &mut EdgeTable<u32>, range: Rang
     let cases = &*CASES;
     for i in range {
         let cells = Cells::new(octree, i);
-        numbers.fill(&cells, |_, _, number| number);
-        cells.mixed().iter().for_each(|cell| {
+        numbers.fill(&cells, |crossing| crossing.number);
+        cells.for_mixed(|cell, mask| {
+            let triangles = &cases[usize::from(mask)].triangles;
             let point = numbers.at(cell);
-            let case = &cases[usize::from(cells.mask(cell))];
-            case.triangles.iter().for_each(|triangle| corners.extend(triangle.map(&point)));
+            corners.extend(triangles.as_flattened().iter().map(|&edge| point(edge)));
         });
     }
     corners

@@ -11,7 +11,7 @@
 //! Cost: about 60 ns and 76/80 bytes a mixed cell beyond the octree (a plane and 12 bytes a brick); positions are not kept.
 
 use super::PIECE;
-use super::cells::{Cells, EdgeTable};
+use super::cells::{Cells, Crossing, EdgeTable};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
@@ -370,6 +370,11 @@ struct Planes {
 const SUM_SIDE: usize = 10;
 /// Entries before that of a cell for one step along each axis.
 const SUM_STEP: [usize; 3] = [SUM_SIDE * SUM_SIDE, SUM_SIDE, 1];
+/// For each axis, how far the four cells round an edge are before the one that starts where it does.
+const ROUND_EDGE: [[usize; 4]; 3] = {
+    let [x, y, z] = SUM_STEP;
+    [[0, y, z, y + z], [0, x, z, x + z], [0, x, y, x + y]]
+};
 
 impl Planes {
     fn new() -> Self {
@@ -382,21 +387,18 @@ impl Planes {
 
     fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement) {
         let sums = &mut self.sums;
-        self.tangents.fill(cells, |axis, at, number| {
-            let mut point = Vec3A::from(at.map(|c| c as f32));
-            point[axis.index()] += position(crossings.offsets()[number as usize]) as f32;
+        self.tangents.fill(cells, |Crossing { axis, start, number, starts_inside }| {
+            let offset = position(crossings.offsets()[number as usize]) as f32;
+            let point = Vec3A::from(start.map(|c| c as f32)) + offset * Vec3A::AXES[axis.index()];
             let normal = match placement {
                 Placement::SharpFeatures => NormalCode(crossings.normals()[number as usize]).decode(axis),
                 Placement::MassPoint => Vec3A::ZERO,
             };
             // Decoded normals point to the high end of the edge.
-            let normal = if cells.is_inside(at) { normal } else { -normal };
+            let normal = if starts_inside { normal } else { -normal };
             let plane = Qef::of_plane(point, normal);
-            let [u, v] = axis.others().map(|a| SUM_STEP[a.index()]);
-            let last = Self::sum_at(at);
-            for cell in [last, last - u, last - v, last - u - v] {
-                sums[cell] += &plane;
-            }
+            let last = Self::sum_at(start);
+            ROUND_EDGE[axis.index()].iter().for_each(|step| sums[last - step] += &plane);
             (point, normal)
         });
     }
@@ -472,9 +474,21 @@ const CELL_SIDE: usize = 9;
 #[derive(Debug, Clone, Copy, Default)]
 struct CellVertices {
     first: u32,
-    /// 0 for a cell with a single vertex.
-    mask: Mask,
-    sharp: bool,
+    /// The mask (0 for a cell with a single vertex), and [`CREASE`].
+    flags: u32,
+}
+
+/// The flag of a cell with a crease.
+const CREASE: u32 = 1 << 8;
+
+impl CellVertices {
+    fn mask(self) -> Mask {
+        self.flags as Mask
+    }
+
+    fn is_creased(self) -> bool {
+        self.flags & CREASE != 0
+    }
 }
 
 /// The vertices of the cells of a brick and of those before it in x, y and z. Entries of other cells are stale.
@@ -505,8 +519,8 @@ impl CellTable {
                 let c = cell.coords();
                 // 1 is the brick's own first cell; a neighbour's last cell comes to stand at 0.
                 let [x, y, z] = std::array::from_fn(|a| (c[a] as i32 + 1 + 8 * steps[a]) as usize);
-                let sharp = sharp[found].get(cell);
-                self.0[(x * CELL_SIDE + y) * CELL_SIDE + z] = CellVertices { first, mask, sharp };
+                let crease = if sharp[found].get(cell) { CREASE } else { 0 };
+                self.0[(x * CELL_SIDE + y) * CELL_SIDE + z] = CellVertices { first, flags: u32::from(mask) | crease };
             });
         }
     }
@@ -524,19 +538,19 @@ impl CellTable {
                 let [x, y, z] = edge.coords().map(|c| c as usize + 1);
                 let at = (x * CELL_SIDE + y) * CELL_SIDE + z;
                 let starts_inside = inside.get(edge);
-                let cells = round.map(|(step, _)| &self.0[at - step]);
-                let mut quad: [u32; 4] = std::array::from_fn(|i| {
-                    let CellVertices { first, mask, .. } = *cells[i];
-                    if mask == 0 {
-                        first
-                    } else {
-                        let start = round[i].1;
-                        first + slot(mask, if starts_inside { start } else { start | axis })
+                let cells = round.map(|(step, _)| self.0[at - step]);
+                let mut quad = cells.map(|cell| cell.first);
+                if cells.iter().fold(0, |a, cell| a | cell.flags) != 0 {
+                    for (vertex, (cell, (_, start))) in quad.iter_mut().zip(cells.iter().zip(round)) {
+                        if cell.mask() != 0 {
+                            *vertex += slot(cell.mask(), if starts_inside { start } else { start | axis });
+                        }
                     }
-                });
-                // The diagonal joins the vertices of a crease.
-                if cells[1].sharp && cells[3].sharp && !(cells[0].sharp && cells[2].sharp) {
-                    quad.rotate_left(1);
+                    // The diagonal joins the vertices of a crease.
+                    let creased = cells.map(CellVertices::is_creased);
+                    if creased[1] && creased[3] && !(creased[0] && creased[2]) {
+                        quad.rotate_left(1);
+                    }
                 }
                 if !starts_inside {
                     quad.swap(1, 3);

@@ -41,7 +41,7 @@ mod tests {
                 end[axis.index()] += 1;
                 if inside(at) != inside(end) {
                     state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    let sample = Sample { offset: (state >> 16) as u16, normal: state as u16 % 0xfe00 };
+                    let sample = Sample::new((state >> 16) as u16, state as u16 % 0xfe00);
                     toggles.push(Toggle { edge: finest_element(DEPTH, at, axis.into()), sample });
                 }
             }

@@ -75,6 +75,12 @@ pub struct Sample {
 pub const OFFSET_MARGIN: u16 = 64;
 
 impl Sample {
+    /// A sample so far from the start of its edge, in 65536ths, but not nearer to its ends than [`OFFSET_MARGIN`].
+    #[inline]
+    pub fn new(offset: u16, normal: u16) -> Self {
+        Sample { offset: offset.clamp(OFFSET_MARGIN, u16::MAX - OFFSET_MARGIN), normal }
+    }
+
     /// The position along the edge, in cells: above 0, below 1.
     pub fn position(self) -> f64 {
         position(self.offset)
@@ -375,7 +381,8 @@ impl Builder {
         if offsets.is_empty() {
             return;
         }
-        offsets.iter().for_each(|&o| self.made.offsets.push(o.clamp(OFFSET_MARGIN, u16::MAX - OFFSET_MARGIN)));
+        debug_assert!(offsets.iter().all(|o| (OFFSET_MARGIN..=u16::MAX - OFFSET_MARGIN).contains(o)), "see Sample::new");
+        self.made.offsets.extend_from_slice(offsets);
         if self.made.with_normals {
             assert_eq!(normals.len(), offsets.len(), "one normal a crossing");
             self.made.normals.extend_from_slice(normals);

@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::geom::Frame;
 use crate::geom::raster::{FineTriangle, rasterise};
 use crate::grid::brick::{Local, Plane};
-use crate::grid::{Axis, Extent, Key};
+use crate::grid::{Axis, Key};
 use crate::mesh::{SourceCounts, TriangleSource};
 use crate::octree::crossings::{Builder, Crossings, Sample, Toggle, finest_element};
 use crate::parallel::in_order;
@@ -174,29 +174,30 @@ fn resolve_block(block: BlockCoords, hits: &[Hit], depth: u32, with_normals: boo
         let mut i = 0;
         while i < of_brick.len() {
             let slot = of_brick[i].slot();
-            let n = 1 + of_brick[i + 1..].iter().take_while(|h| h.slot() == slot).count();
-            let edge = &of_brick[i..i + n];
-            i += n;
+            let mut n = 1;
+            while i + n < of_brick.len() && of_brick[i + n].slot() == slot {
+                n += 1;
+            }
             // The middle one: for an odd number of walls the surface that is left when pairs cancel from both ends.
-            let sample = edge[(n - 1) / 2];
+            let middle = of_brick[i + (n - 1) / 2];
+            let sample = Sample::new(middle.offset(), middle.normal().0);
             if n % 2 == 1 {
-                crossed[sample.axis()].set(Local::from_index(sample.local()));
-                out.offsets.push(sample.offset());
+                crossed[middle.axis()].set(Local::from_index(middle.local()));
+                out.offsets.push(sample.offset);
                 if with_normals {
-                    out.normals.push(sample.normal().0);
+                    out.normals.push(sample.normal);
                 }
             }
             if n > 1 {
-                let walls = edge.chunk_by(|a, b| b.offset() - a.offset() <= COINCIDENT).count();
+                let walls = of_brick[i..i + n].chunk_by(|a, b| b.offset() - a.offset() <= COINCIDENT).count();
                 if walls % 2 != n % 2 {
-                    let axis = Axis::ALL[sample.axis()];
-                    let local = Local::from_index(sample.local()).coords();
+                    let local = Local::from_index(middle.local()).coords();
                     let point = std::array::from_fn(|a| (block[a] * 8 + at[a]) * 8 + local[a]);
-                    let edge = finest_element(depth, point, Extent::from(axis));
-                    let sample = Sample { offset: sample.offset(), normal: sample.normal().0 };
+                    let edge = finest_element(depth, point, Axis::ALL[middle.axis()].into());
                     out.merges.push(Toggle { edge, sample });
                 }
             }
+            i += n;
         }
         out.bricks.push((key, crossed));
     }
