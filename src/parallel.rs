@@ -4,15 +4,20 @@ use crate::error::{Error, Result};
 use crate::progress::Progress;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex};
+
+/// Pieces a thread that may be made and wait to be taken.
+const AHEAD: usize = 4;
+/// Why the lock is never poisoned.
+const NO_PANIC: &str = "neither making nor taking panics";
 
 /// Makes the pieces `0..count` on all threads of the current pool and passes them on to `take` in order. `init` makes what a thread
 /// reuses from piece to piece.
 ///
 /// Threads fetch numbers in ascending order. Whoever has made a piece puts it down, and takes what is next in order as long as there is
-/// any; meanwhile others that have made one wait. So there are never more pieces than threads, nobody waits for a wave to end, and one
-/// thread alone needs no other.
+/// any; who is more than [`AHEAD`] pieces a thread ahead of what is taken waits. So few pieces exist at a time, nobody waits for a wave
+/// to end, and one thread alone needs no other.
 ///
 /// # Errors
 /// The first error of `take`, and `Cancelled`.
@@ -30,7 +35,9 @@ pub(crate) fn in_order<S, T: Send>(
         result: Result<()>,
     }
     let line = Mutex::new(Line { waiting: BTreeMap::new(), next: 0, take, result: Ok(()) });
+    let moved = Condvar::new();
     let fetched = AtomicUsize::new(0);
+    let ahead = AHEAD * rayon::current_num_threads();
     let work = || {
         let mut state = None;
         loop {
@@ -38,8 +45,11 @@ pub(crate) fn in_order<S, T: Send>(
             if number >= count {
                 return;
             }
+            // Whoever has the number that is next never waits here.
+            let too_early = |line: &mut Line<T, _>| number >= line.next + ahead && line.result.is_ok();
+            drop(moved.wait_while(line.lock().expect(NO_PANIC), too_early));
             let piece = make(state.get_or_insert_with(&init), number);
-            let mut line = line.lock().expect("taking does not panic");
+            let mut line = line.lock().expect(NO_PANIC);
             line.waiting.insert(number, piece);
             while line.result.is_ok() {
                 let next = line.next;
@@ -47,6 +57,7 @@ pub(crate) fn in_order<S, T: Send>(
                 line.next += 1;
                 line.result = if progress.is_cancelled() { Err(Error::Cancelled) } else { (line.take)(piece) };
             }
+            moved.notify_all();
             if line.result.is_err() {
                 fetched.store(count, Ordering::Relaxed);
                 return;
@@ -59,7 +70,7 @@ pub(crate) fn in_order<S, T: Send>(
         }
         work();
     });
-    line.into_inner().expect("taking does not panic").result
+    line.into_inner().expect(NO_PANIC).result
 }
 
 /// `0..len` in pieces of at most `size`: how many, and piece number n.

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
 /// Bytes gathered before they are written.
-const CHUNK: usize = 1 << 20;
+const CHUNK: usize = 1 << 18;
 /// Points or corners encoded at once, so that the buffer does not grow far beyond [`CHUNK`].
 const PIECE: usize = 1 << 14;
 

@@ -5,7 +5,7 @@ use crate::error::{Error, Place, Result};
 use glam::DVec3;
 
 /// Triangles passed on at once.
-const BATCH: usize = 1 << 14;
+const BATCH: usize = 1 << 12;
 
 /// Cuts polygons into triangles and passes these on in batches.
 pub(crate) struct Batch<'a> {

@@ -381,7 +381,10 @@ impl Builder {
         if offsets.is_empty() {
             return;
         }
-        debug_assert!(offsets.iter().all(|o| (OFFSET_MARGIN..=u16::MAX - OFFSET_MARGIN).contains(o)), "see Sample::new");
+        debug_assert!(
+            offsets.iter().all(|o| (OFFSET_MARGIN..=u16::MAX - OFFSET_MARGIN).contains(o)),
+            "see Sample::new"
+        );
         self.made.offsets.extend_from_slice(offsets);
         if self.made.with_normals {
             assert_eq!(normals.len(), offsets.len(), "one normal a crossing");
