@@ -45,15 +45,16 @@ pub(crate) enum Command {
 #[derive(Debug, clap::Args)]
 #[command(
     group = ArgGroup::new("goal").required(true).args(["out", "output"]),
+    override_usage = "zmend repair [OPTIONS] <IN> <OUT>\n       zmend repair [OPTIONS] <IN> -o <OUT>",
     after_help = "\
 Examples:
   zmend repair broken.stl fixed.stl
-  zmend repair broken.obj -o fixed.ply --depth 9           twice as fine: about four times the faces and time
-  zmend repair part.stl part-fixed.stl --surface dc        keep sharp edges and corners
-  zmend repair in.ply out.ply --json --report full         measure input and result, as JSON for scripts
+  zmend repair broken.obj -o fixed.ply --depth 9      twice as fine, four times the faces and time
+  zmend repair part.stl fixed.stl --surface dc        keep sharp edges and corners
+  zmend repair in.ply out.ply --json --report full    measure both, for scripts
 
-Depth: 2^depth cells lie along the longest side of the model (and a little around it). What is thinner than a cell
-may vanish or grow together."
+The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
+Holes are closed, and so are gaps between faces that should touch."
 )]
 pub(crate) struct RepairArgs {
     /// Mesh to repair.
@@ -93,7 +94,7 @@ pub(crate) struct GridArgs {
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
     /// Kind of surface.
-    #[arg(short, long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
+    #[arg(short = 's', long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
     pub(crate) kind: SurfaceArg,
     /// Cut the quadrilaterals of dc and quads into triangles.
     #[arg(long)]
@@ -192,9 +193,10 @@ pub(crate) enum ReportArg {
 #[command(after_help = "\
 Examples:
   zmend info part.stl
-  zmend info *.ply --json          one JSON object a file, one a line
+  zmend info *.ply --json        one JSON object a file, one a line
 
-The triangles of STL files are taken as connected where their corners are identical to the last bit.")]
+The triangles of STL files are taken as connected where their corners are identical to the last bit. Whether a surface \
+crosses itself is not looked at.")]
 pub(crate) struct InfoArgs {
     /// Meshes to look at.
     #[arg(value_name = "FILE", required = true)]
@@ -234,7 +236,7 @@ pub(crate) struct SampleArgs {
 #[command(after_help = "\
 Examples:
   zmend render broken.ply picture.png
-  zmend render broken.ply both.png --compare fixed.ply            side by side at one scale
+  zmend render broken.ply both.png --compare fixed.ply      side by side at one scale
   zmend render part.stl top.png --elevation 90 --wireframe --size 1600x1200")]
 pub(crate) struct RenderArgs {
     /// Mesh to draw.

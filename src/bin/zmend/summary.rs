@@ -43,7 +43,7 @@ impl Summary<'_> {
         ))?;
         self.warnings().iter().for_each(print::warning);
         let seconds: Vec<String> =
-            self.seconds.iter().map(|&(name, time)| format!("{name} {}", units::seconds(time))).collect();
+            self.seconds.iter().map(|&(name, time)| format!("{name} {}", units::time(time))).collect();
         let memory = self.peak_memory.map_or(String::new(), |bytes| format!(", {} of memory", units::bytes(bytes)));
         print::out(&format!("{}{memory}\n{}\n", seconds.join(", "), self.verdict()))
     }

@@ -54,9 +54,14 @@ pub(crate) fn vector(v: DVec3) -> String {
     v.to_array().map(real).join(" ")
 }
 
-/// Seconds.
-pub(crate) fn seconds(s: f64) -> String {
-    if s < 9.995 { format!("{s:.2} s") } else { format!("{s:.1} s") }
+/// A time, given in seconds.
+pub(crate) fn time(s: f64) -> String {
+    match s {
+        ..0.000_5 => "0 ms".to_owned(),
+        ..0.099_5 => format!("{:.0} ms", 1000.0 * s),
+        ..9.995 => format!("{s:.2} s"),
+        _ => format!("{s:.1} s"),
+    }
 }
 
 #[cfg(test)]
@@ -77,7 +82,8 @@ mod tests {
             [0.0, 1.0, -2.5, 1234.5678, 123_456_789.0, 0.001_234_567, 1e-7, 1e12, f64::NAN].map(real),
             ["0", "1", "-2.5", "1234.57", "123456789", "0.00123457", "1.00000e-7", "1.00000e12", "NaN"]
         );
-        assert_eq!([0.004, 9.994, 9.996, 75.0].map(seconds), ["0.00 s", "9.99 s", "10.0 s", "75.0 s"]);
+        assert_eq!([0.0004, 0.0042, 0.0994].map(time), ["0 ms", "4 ms", "99 ms"]);
+        assert_eq!([0.0996, 9.994, 9.996, 75.0].map(time), ["0.10 s", "9.99 s", "10.0 s", "75.0 s"]);
         assert_eq!(vector(DVec3::new(1.0, -0.5, 0.0)), "1 -0.5 0");
     }
 }
