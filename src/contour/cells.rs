@@ -79,6 +79,14 @@ impl<'a> Cells<'a> {
         self.corners.iter().enumerate().fold(0, |mask, (i, plane)| mask | ((plane.0[x as usize] >> bit & 1) as u8) << i)
     }
 
+    /// Whether a lattice point of the brick or the layer after it (0 ..= 8 each) is inside.
+    #[inline]
+    pub(super) fn is_inside(&self, at: [u32; 3]) -> bool {
+        let [x, y, z] = at.map(|c| (c.min(7), c >> 3));
+        let corner = (x.1 << 2 | y.1 << 1 | z.1) as usize;
+        self.corners[corner].get(Local::new(x.0, y.0, z.0))
+    }
+
     pub(super) fn brick(&self) -> &'a Brick {
         self.brick
     }
@@ -88,105 +96,111 @@ impl<'a> Cells<'a> {
 const SIDE: usize = 9;
 /// Positions of the table for one axis.
 const LAYER: usize = SIDE * SIDE * SIDE;
+/// Entries before a position's for one step along each axis.
+const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
 
 /// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale.
-pub(super) struct EdgeTable<T>([Box<[T; LAYER]>; 3]);
+pub(super) struct EdgeTable<T>(Box<[T; 3 * LAYER]>);
 
 /// Where bit b of a plane's word stands in a layer of the table.
 static AT: [u8; 64] = {
     let mut at = [0; 64];
     let mut b = 0;
     while b < 64 {
-        at[b] = ((b >> 3) * SIDE + (b & 7)) as u8;
+        at[b] = ((b >> 3) * STEP[1] + (b & 7)) as u8;
         b += 1;
+    }
+    at
+};
+
+/// How far the entry of each edge of a cell is from that of its first edge.
+static EDGE_AT: [u16; 12] = {
+    let mut at = [0; 12];
+    let mut i = 0;
+    while i < 12 {
+        let start = Edge::ALL[i].corners()[0];
+        let mut sum = Edge::ALL[i].axis().index() * LAYER;
+        let mut a = 0;
+        while a < 3 {
+            if start.is_high(Axis::ALL[a]) {
+                sum += STEP[a];
+            }
+            a += 1;
+        }
+        at[i] = sum as u16;
+        i += 1;
     }
     at
 };
 
 impl<T: Copy> EdgeTable<T> {
     pub(super) fn new(empty: T) -> Self {
-        EdgeTable(std::array::from_fn(|_| Box::new([empty; LAYER])))
+        EdgeTable(Box::new([empty; 3 * LAYER]))
     }
 
-    /// The entry of an edge of a cell of the brick last filled in. The edge must be crossed.
+    /// The entries of the edges of a cell of the brick last filled in. Only crossed edges have any.
     #[inline]
-    pub(super) fn get(&self, cell: Local, edge: Edge) -> T {
+    pub(super) fn at(&self, cell: Local) -> impl Fn(Edge) -> T + '_ {
         let [x, y, z] = cell.coords().map(|c| c as usize);
-        self.0[edge.index() >> 2][(x * SIDE + y) * SIDE + z + usize::from(EDGE_STEP[edge.index()])]
+        let entries = &self.0[x * STEP[0] + y * STEP[1] + z..];
+        move |edge| entries[usize::from(EDGE_AT[edge.index()])]
     }
 
-    /// Makes an entry for each crossing round the cells of a brick, from its axis and its number.
-    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(usize, u32) -> T) {
+    /// Makes an entry for each crossing round the cells of a brick, from its axis, its edge's start in the brick (0 ..= 8 each) and its
+    /// number.
+    #[inline]
+    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Axis, [u32; 3], u32) -> T) {
+        const LOW_Y: u64 = 0xff;
+        const LOW_Z: u64 = 0x0101_0101_0101_0101;
         let mut number = cells.brick.first;
-        for (axis, plane) in cells.brick.crossed.iter().enumerate() {
+        for (axis, plane) in Axis::ALL.into_iter().zip(&cells.brick.crossed) {
             for (x, &word) in plane.0.iter().enumerate() {
                 for b in Bits(word) {
-                    self.0[axis][x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, number);
+                    self.0[axis.index() * LAYER + x * STEP[0] + usize::from(AT[b as usize])] =
+                        entry(axis, [x as u32, b >> 3, b & 7], number);
                     number += 1;
                 }
             }
         }
-        const LOW_Y: u64 = 0xff;
-        const LOW_Z: u64 = 0x0101_0101_0101_0101;
         let [px, py, pz, pxy, pxz, pyz] = cells.plus;
-        self.fill_layer(px, &[1, 2], [8, 0, 0], !0, &mut entry);
-        self.fill_layer(py, &[0, 2], [0, 8, 0], LOW_Y, &mut entry);
-        self.fill_layer(pz, &[0, 1], [0, 0, 8], LOW_Z, &mut entry);
-        self.fill_layer(pxy, &[2], [8, 8, 0], LOW_Y, &mut entry);
-        self.fill_layer(pxz, &[1], [8, 0, 8], LOW_Z, &mut entry);
-        self.fill_layer(pyz, &[0], [0, 8, 8], LOW_Y & LOW_Z, &mut entry);
+        for (brick, axes, start, select) in [
+            (px, &[Axis::Y, Axis::Z][..], [8, 0, 0], !0),
+            (py, &[Axis::X, Axis::Z], [0, 8, 0], LOW_Y),
+            (pz, &[Axis::X, Axis::Y], [0, 0, 8], LOW_Z),
+            (pxy, &[Axis::Z], [8, 8, 0], LOW_Y),
+            (pxz, &[Axis::Y], [8, 0, 8], LOW_Z),
+            (pyz, &[Axis::X], [0, 8, 8], LOW_Y & LOW_Z),
+        ] {
+            for &axis in axes {
+                self.fill_layer(brick, axis, start, select, &mut entry);
+            }
+        }
     }
 
-    /// The same for the layer of a neighbouring brick that touches this one: its edges along `axes` at the selected bits.
+    /// The same for the edges along `axis` of a neighbouring brick at the selected bits, in the layer that touches this brick, which
+    /// starts at `start`.
     fn fill_layer(
         &mut self,
         brick: &Brick,
-        axes: &[usize],
-        [x0, y0, z0]: [usize; 3],
+        axis: Axis,
+        start: [u32; 3],
         select: u64,
-        entry: &mut impl FnMut(usize, u32) -> T,
+        entry: &mut impl FnMut(Axis, [u32; 3], u32) -> T,
     ) {
-        let at = (x0 * SIDE + y0) * SIDE + z0;
-        let words = if x0 == 0 { 8 } else { 1 };
-        let mut number = brick.first;
-        for (axis, plane) in brick.crossed.iter().enumerate() {
-            if axes.contains(&axis) {
-                let mut before = number;
-                for (x, &word) in plane.0[..words].iter().enumerate() {
-                    for b in Bits(word & select) {
-                        let below = (word & ((1 << b) - 1)).count_ones();
-                        self.0[axis][at + x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, before + below);
-                    }
-                    before += word.count_ones();
-                }
-                if axes.last() == Some(&axis) {
-                    break;
-                }
+        let [x0, y0, z0] = start.map(|c| c as usize);
+        let at = axis.index() * LAYER + x0 * STEP[0] + y0 * STEP[1] + z0;
+        let words = &brick.crossed[axis.index()].0[..if x0 == 0 { 8 } else { 1 }];
+        if words.iter().all(|word| word & select == 0) {
+            return;
+        }
+        let mut before = brick.first + brick.crossed[..axis.index()].iter().map(Plane::count).sum::<u32>();
+        for (x, &word) in words.iter().enumerate() {
+            for b in Bits(word & select) {
+                let number = before + (word & ((1 << b) - 1)).count_ones();
+                let from = [start[0] + x as u32, start[1] + (b >> 3), start[2] + (b & 7)];
+                self.0[at + x * STEP[0] + usize::from(AT[b as usize])] = entry(axis, from, number);
             }
-            number += plane.count();
+            before += word.count_ones();
         }
     }
 }
-
-/// How far the start of each edge of a cell is from the cell's own place in a layer of the table.
-static EDGE_STEP: [u8; 12] = {
-    let mut step = [0; 12];
-    let mut i = 0;
-    while i < 12 {
-        let edge = Edge::ALL[i];
-        let corner = edge.corners()[0];
-        let mut s = 0;
-        if corner.is_high(Axis::X) {
-            s += SIDE * SIDE;
-        }
-        if corner.is_high(Axis::Y) {
-            s += SIDE;
-        }
-        if corner.is_high(Axis::Z) {
-            s += 1;
-        }
-        step[i] = s as u8;
-        i += 1;
-    }
-    step
-};

@@ -45,6 +45,7 @@ pub fn marching_cubes(
 }
 
 /// The number of triangles of the whole surface.
+#[inline(never)]
 fn count_triangles(octree: &SignedOctree) -> u64 {
     let of_brick = |i: usize| {
         let cells = Cells::new(octree, i);
@@ -58,6 +59,7 @@ fn count_triangles(octree: &SignedOctree) -> u64 {
     (4 * octree.crossings().len() as i64 + corrections) as u64
 }
 
+#[inline(never)]
 fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
     let bricks = &crossings.bricks()[range];
     let first = bricks.first().map_or(0, |b| b.first as usize);
@@ -65,32 +67,33 @@ fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec
     let mut points = Vec::with_capacity(end - first);
     let mut offsets = crossings.offsets()[first..end].iter();
     for brick in bricks {
-        let origin = crossings.origin(brick).map(f64::from);
+        let origin = DVec3::from(crossings.origin(brick).map(f64::from));
         for (axis, plane) in brick.crossed.iter().enumerate() {
-            for local in plane.iter() {
-                let c = local.coords();
-                let mut p: [f64; 3] = std::array::from_fn(|a| origin[a] + f64::from(c[a]));
-                p[axis] += position(*offsets.next().expect("one offset a crossing"));
-                points.push(frame.to_model(DVec3::from(p)));
-            }
+            let along = DVec3::AXES[axis];
+            plane.iter().for_each(|local| {
+                let [x, y, z] = local.coords().map(f64::from);
+                let offset = position(*offsets.next().expect("one offset a crossing"));
+                points.push(frame.to_model(origin + DVec3::new(x, y, z) + along * offset));
+            });
         }
     }
     points
 }
 
+#[inline(never)]
 fn triangles_of(octree: &SignedOctree, numbers: &mut EdgeTable<u32>, range: Range<usize>) -> Vec<u32> {
     let bricks = &octree.crossings().bricks()[range.clone()];
     let crossed = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
     let mut corners = Vec::with_capacity(7 * crossed);
+    let cases = &*CASES;
     for i in range {
         let cells = Cells::new(octree, i);
-        numbers.fill(&cells, |_, number| number);
-        for cell in cells.mixed().iter() {
-            let case = &CASES[usize::from(cells.mask(cell))];
-            for triangle in &case.triangles {
-                corners.extend(triangle.map(|edge| numbers.get(cell, edge)));
-            }
-        }
+        numbers.fill(&cells, |_, _, number| number);
+        cells.mixed().iter().for_each(|cell| {
+            let point = numbers.at(cell);
+            let case = &cases[usize::from(cells.mask(cell))];
+            case.triangles.iter().for_each(|triangle| corners.extend(triangle.map(&point)));
+        });
     }
     corners
 }

@@ -49,6 +49,21 @@ pub struct InputInfo {
     pub trailing_bytes: u64,
 }
 
+impl std::fmt::Display for InputInfo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let InputInfo { path, format, encoding, bytes, points, polygons, trailing_bytes, .. } = self;
+        write!(f, "{}: {format} ({encoding}), {bytes} bytes, ", path.display())?;
+        if let Some(points) = points {
+            write!(f, "{points} vertices, ")?;
+        }
+        write!(f, "{polygons} polygons")?;
+        if *trailing_bytes > 0 {
+            write!(f, "; {trailing_bytes} bytes behind the end were ignored")?;
+        }
+        Ok(())
+    }
+}
+
 /// Opens a file as a source of triangles.
 ///
 /// # Errors
@@ -170,5 +185,40 @@ impl TriangleSource for Input {
 
     fn size_hint(&self) -> Option<u64> {
         self.source().size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Opens a file of the given content.
+    fn open_bytes(name: &str, bytes: &[u8]) -> Result<(InputInfo, String)> {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        let info = open(&path)?.info().clone();
+        let shown = info.to_string().replace(&format!("{}/", directory.path().display()), "");
+        Ok((info, shown))
+    }
+
+    #[test]
+    fn what_is_known_of_a_file_can_be_shown() {
+        let (info, shown) = open_bytes("a.stl", &[[0; 84].as_slice(), b"behind"].concat()).expect("valid");
+        assert!(info.is_streamed);
+        assert_eq!(shown, "a.stl: STL (binary), 90 bytes, 0 polygons; 6 bytes behind the end were ignored");
+        let (info, shown) = open_bytes("a.obj", b"v 0 0 0\nf 1").expect("valid");
+        assert!(!info.is_streamed);
+        assert_eq!(shown, "a.obj: OBJ (text), 11 bytes, 1 vertices, 1 polygons");
+    }
+
+    #[test]
+    fn headers_longer_than_the_prefix_are_read_as_a_whole() {
+        let comments = "comment long\n".repeat(PREFIX as usize / 12);
+        let header = format!("ply\nformat binary_little_endian 1.0\n{comments}");
+        let (info, _) =
+            open_bytes("a.ply", format!("{header}element vertex 0\nend_header\n").as_bytes()).expect("valid");
+        assert_eq!((info.is_streamed, info.points), (false, Some(0)));
+        assert!(open_bytes("a.ply", header.as_bytes()).is_err());
     }
 }

@@ -183,6 +183,7 @@ impl Hits for HitSorter {
 }
 
 /// Sorts hits by edge, then by offset and normal.
+#[inline(never)]
 pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) {
     const DIGIT: u32 = 10;
     if hits.len() < 512 {
@@ -230,7 +231,7 @@ mod tests {
         bucket.drain_into(&mut hits);
         assert_eq!(brick_coords(hits[0].brick()), [5, 2, 7]);
         assert_eq!((hits[0].local(), hits[0].axis(), hits[0].offset()), (64 * 3 + 8 * 7 + 1, 1, 999));
-        assert_eq!(hits[0].normal().decode(Axis::Y), glam::DVec3::Y);
+        assert_eq!(hits[0].normal().decode(Axis::Y), glam::Vec3A::Y);
     }
 
     #[test]

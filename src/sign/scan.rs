@@ -84,7 +84,7 @@ pub fn scan(
 }
 
 /// Rasterises a triangle in model coordinates; `false` if it cannot be placed in the grid.
-#[inline]
+#[inline(never)]
 fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter) -> bool {
     let [Some(a), Some(b), Some(c)] = triangle.map(|p| frame.snap(p)) else {
         return false;
@@ -168,6 +168,7 @@ fn resolve(
 /// Hits as close as this on one edge are one wall, in 65536ths of a cell: room for two roundings.
 const COINCIDENT: u16 = 2;
 
+#[inline(never)]
 fn resolve_block(block: BlockCoords, hits: &[Hit], depth: u32, with_normals: bool) -> Resolved {
     let mut out = Resolved { hits: hits.len() as u64, ..Resolved::default() };
     out.offsets.reserve_exact(hits.len());
