@@ -33,7 +33,11 @@ impl Qef {
     #[inline]
     pub fn of_plane(p: Vec3A, n: Vec3A) -> Qef {
         let normal = Vec4::from((n, 1.0));
-        Qef { rows: [normal * n.x, normal * n.y, normal * n.z], moments: normal * n.dot(p), points: Vec4::from((p, 1.0)) }
+        Qef {
+            rows: [normal * n.x, normal * n.y, normal * n.z],
+            moments: normal * n.dot(p),
+            points: Vec4::from((p, 1.0)),
+        }
     }
 
     /// Mean of the points. There must be at least one.

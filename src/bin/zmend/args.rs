@@ -82,10 +82,10 @@ pub(crate) struct RepairArgs {
 #[command(next_help_heading = "Grid")]
 pub(crate) struct GridArgs {
     /// Resolution: 2^N cells a side, 3 to 18.
-    #[arg(short, long, value_name = "N", default_value_t = 8, value_parser = depth_range())]
+    #[arg(short, long, value_name = "N", default_value_t = 8, value_parser = depth_range(), allow_negative_numbers = true)]
     pub(crate) depth: u32,
     /// Part of the grid that the longest side of the model takes, above 0 and below 1.
-    #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale)]
+    #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: f64,
 }
 

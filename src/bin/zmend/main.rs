@@ -2,6 +2,7 @@
 
 mod args;
 mod bars;
+mod digits;
 mod goal;
 mod info;
 mod json;

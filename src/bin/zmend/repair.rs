@@ -2,15 +2,15 @@
 
 use crate::args::{RepairArgs, ReportArg};
 use crate::bars::Bars;
-use crate::goal;
 use crate::measure::{Measured, Side};
 use crate::summary::Summary;
+use crate::{digits, goal};
 use glam::DVec3;
+use std::iter;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use zmend::geom::Frame;
-use zmend::io::{self, Format, Input, Precision, WriteOptions};
+use zmend::io::{self, Format, Input, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
 use zmend::{Options, RepairReport, Result, repair_into};
@@ -26,16 +26,18 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         depth: args.grid.depth,
         scale: args.grid.scale,
         surface: args.surface.kind.into(),
-        triangles: args.surface.triangles,
+        // STL has nothing else, and the surface knows better than the writer which diagonals to take.
+        triangles: args.surface.triangles || format == Format::Stl,
     };
 
     let bars = Bars::new(!args.tell.quiet && !args.tell.json);
     let start = Instant::now();
     bars.begin(Stage::Read, 0);
     let mut input = Bounded::open(&args.input)?;
-    let precision = input.precision(&options)?;
+    let is_text = args.write.ascii;
+    let (precision, loses_digits) = digits::choose(&input.bounds, &options, format, is_text)?;
     let read = start.elapsed();
-    let write_options = WriteOptions { precision, is_text: args.write.ascii, ..WriteOptions::default() };
+    let write_options = WriteOptions { precision, is_text, ..WriteOptions::default() };
     let mut writer = io::create(goal, format, write_options)?;
     let report = repair_into(&mut input, &options, &mut writer, &bars)?;
     let repaired = start.elapsed();
@@ -52,25 +54,23 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let before = before(&input.input, args.tell.report)?;
     let after = after(&report, goal, bytes, args.tell.report)?;
     drop(bars);
-    let mut seconds: Vec<(&'static str, f64)> =
-        report.times.iter().map(|(stage, time)| (stage.name(), time.as_secs_f64())).collect();
-    if let Some(first) = seconds.first_mut() {
-        first.1 = read.as_secs_f64();
-    }
-    seconds.push((Stage::Write.name(), total.saturating_sub(repaired).as_secs_f64()));
-    seconds.push(("total", total.as_secs_f64()));
-    let loses_digits = precision == Precision::Double && format == Format::Stl && !args.write.ascii;
+    // The reading was done before the repair asked for it.
+    let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read).map(|&(s, time)| (s.name(), time));
+    let times = iter::once(("read", read))
+        .chain(stages)
+        .chain([("write", total.saturating_sub(repaired)), ("total", total)])
+        .collect();
     let summary = Summary {
         input: input.input.info(),
         before,
         goal,
         format,
-        precision: if loses_digits { Precision::Single } else { precision },
+        precision,
         loses_digits,
         after,
         options,
         report,
-        seconds,
+        times,
         peak_memory,
     };
     let told = if args.tell.json { summary.print_json() } else { summary.print() };
@@ -88,17 +88,6 @@ impl Bounded {
         let mut input = io::open(path)?;
         let bounds = input.bounds()?;
         Ok(Bounded { input, bounds })
-    }
-
-    /// 32-bit coordinates unless, somewhere on the model, they are further apart than 1/1024 of a cell.
-    fn precision(&self, options: &Options) -> Result<Precision> {
-        if self.bounds.is_empty() {
-            return Ok(Precision::Single);
-        }
-        let cell = Frame::fit(&self.bounds, options.depth, options.scale)?.cell_size();
-        let farthest = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
-        let step = farthest / f64::from(1 << 24);
-        Ok(if step > cell / 1024.0 { Precision::Double } else { Precision::Single })
     }
 }
 

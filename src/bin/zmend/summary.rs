@@ -5,6 +5,7 @@ use crate::print::{self, Table};
 use crate::{json, units};
 use serde_json::{Map, Value, json};
 use std::path::Path;
+use std::time::Duration;
 use zmend::io::{Format, InputInfo, Precision};
 use zmend::{Options, RepairReport, Result, Surface};
 
@@ -16,13 +17,13 @@ pub(crate) struct Summary<'a> {
     pub(crate) format: Format,
     /// Precision of the written coordinates.
     pub(crate) precision: Precision,
-    /// Whether the format cannot hold as many digits as the grid has.
+    /// Whether this is too low for the grid, because the format can do no better.
     pub(crate) loses_digits: bool,
     pub(crate) after: Side,
     pub(crate) options: Options,
     pub(crate) report: RepairReport,
     /// Wall-clock time of each stage, and in total.
-    pub(crate) seconds: Vec<(&'static str, f64)>,
+    pub(crate) times: Vec<(&'static str, Duration)>,
     pub(crate) peak_memory: Option<u64>,
 }
 
@@ -43,7 +44,7 @@ impl Summary<'_> {
         ))?;
         self.warnings().iter().for_each(print::warning);
         let seconds: Vec<String> =
-            self.seconds.iter().map(|&(name, time)| format!("{name} {}", units::time(time))).collect();
+            self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
         let memory = self.peak_memory.map_or(String::new(), |bytes| format!(", {} of memory", units::bytes(bytes)));
         print::out(&format!("{}{memory}\n{}\n", seconds.join(", "), self.verdict()))
     }
@@ -53,7 +54,7 @@ impl Summary<'_> {
         warnings.iter().for_each(print::warning);
         let RepairReport { frame, scan, closing, .. } = &self.report;
         let seconds: Map<String, Value> =
-            self.seconds.iter().map(|&(name, time)| (name.to_owned(), json!(time))).collect();
+            self.times.iter().map(|&(name, time)| (name.to_owned(), json!(time.as_secs_f64()))).collect();
         let output = json!({
             "path": self.goal.display().to_string(),
             "format": self.format.extension(),
