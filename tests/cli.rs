@@ -70,9 +70,9 @@ impl Ran {
         assert!(words.iter().all(|word| self.err.contains(word)), "{words:?} in {self:?}");
     }
 
-    /// Is refused by the parser of arguments.
+    /// The parser of arguments refuses it, with all of these words.
     #[track_caller]
-    fn is_misused(self, words: &[&str]) {
+    fn refused(self, words: &[&str]) {
         assert_eq!(self.code, Some(2), "{self:?}");
         assert!(self.err.starts_with("error: ") && words.iter().all(|word| self.err.contains(word)), "{self:?}");
     }
@@ -108,9 +108,9 @@ fn samples_are_listed_and_written() {
     assert_eq!(io::read(folder.path("gear.stl")).unwrap().faces.len(), 108);
     folder.run("sample nothing x.ply").fails(&["nothing", "knot-holes"]);
     folder.run("sample knot x.gltf").fails(&["x.gltf", ".ply"]);
-    folder.run("sample knot").is_misused(&["OUT"]);
-    folder.run("sample").is_misused(&["NAME"]);
-    folder.run("sample knot x.ply --detail 21").is_misused(&["detail"]);
+    folder.run("sample knot").refused(&["OUT"]);
+    folder.run("sample").refused(&["NAME"]);
+    folder.run("sample knot x.ply --detail 21").refused(&["detail"]);
     assert_eq!(folder.names(), ["gear.stl", "knot.ply"]);
 }
 
@@ -219,7 +219,7 @@ fn quiet_says_nothing() {
     }
     let ran = folder.run("repair none.ply a.ply --quiet --force");
     ran.fails(&["none.ply"]);
-    folder.run("repair knot.ply c.ply --quiet --json").is_misused(&["--quiet", "--json"]);
+    folder.run("repair knot.ply c.ply --quiet --json").refused(&["--quiet", "--json"]);
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn threads_do_not_change_a_byte() {
         let [one, two] = [1, 2].map(|threads| fs::read(folder.path(&format!("{threads}.{name}"))).unwrap());
         assert!(one == two && one.len() > 1000, "{input}");
     }
-    folder.run("repair knot.ply a.ply --threads 0").is_misused(&["threads"]);
+    folder.run("repair knot.ply a.ply --threads 0").refused(&["threads"]);
 }
 
 #[test]
@@ -289,13 +289,13 @@ fn errors_name_the_file_and_the_remedy() {
     folder.run("repair knot.ply no/such/out.ply").fails(&["no/such/out.ply", "directory"]);
     folder.run("repair knot.ply out.gltf").fails(&["out.gltf", ".ply"]);
     folder.run("repair knot.ply out").fails(&["out: ", ".ply"]);
-    folder.run("repair knot.ply").is_misused(&["OUT"]);
-    folder.run("repair knot.ply a.ply -o b.ply").is_misused(&["cannot be used with"]);
+    folder.run("repair knot.ply").refused(&["OUT"]);
+    folder.run("repair knot.ply a.ply -o b.ply").refused(&["cannot be used with"]);
     for depth in ["2", "19", "-1", "many"] {
-        folder.run(&format!("repair knot.ply out.ply --depth {depth}")).is_misused(&["--depth"]);
+        folder.run(&format!("repair knot.ply out.ply --depth {depth}")).refused(&["--depth"]);
     }
     for scale in ["0", "1", "nan", "big"] {
-        folder.run(&format!("repair knot.ply out.ply --scale {scale}")).is_misused(&["--scale"]);
+        folder.run(&format!("repair knot.ply out.ply --scale {scale}")).refused(&["--scale"]);
     }
     folder.run("").code.filter(|&code| code == 2).unwrap();
     assert_eq!(folder.names(), ["bad.off", "dir.ply", "empty.stl", "knot.ply", "note.txt"]);
@@ -358,8 +358,8 @@ fn pictures_are_drawn() {
     assert!(fs::read(folder.path("a.png")).unwrap().starts_with(b"\x89PNG"));
     folder.run("render knot.ply b.jpg").fails(&["b.jpg", ".png"]);
     folder.run("render none.ply b.png").fails(&["none.ply"]);
-    folder.run("render knot.ply b.png --size 100").is_misused(&["--size"]);
-    folder.run("render knot.ply b.png --azimuth nan").is_misused(&["--azimuth"]);
+    folder.run("render knot.ply b.png --size 100").refused(&["--size"]);
+    folder.run("render knot.ply b.png --azimuth nan").refused(&["--azimuth"]);
     assert_eq!(folder.names(), ["a.png", "knot.ply"]);
 }
 

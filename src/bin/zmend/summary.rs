@@ -128,7 +128,9 @@ impl Summary<'_> {
             && self.after.faces > 0
             && !measured.is_solid()
         {
-            warnings.push(format!("the written file is not the surface of a solid: {}", measured.verdict()));
+            let stl = "; STL joins vertices at one place, other formats do not";
+            let remedy = if self.format == Format::Stl { stl } else { "" };
+            warnings.push(format!("the written file is not the surface of a solid: {}{remedy}", measured.verdict()));
         }
         warnings
     }
