@@ -4,7 +4,7 @@ use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::Mask;
 use crate::grid::{Axis, Edge};
 use crate::octree::SignedOctree;
-use crate::octree::crossings::{Brick, toward};
+use crate::octree::crossings::Brick;
 
 /// For each cell of a brick (named by its least corner): which of its edges are crossed, which of its corners are inside.
 pub(super) struct Cells<'a> {
@@ -22,8 +22,7 @@ impl<'a> Cells<'a> {
     pub(super) fn new(octree: &'a SignedOctree, i: usize) -> Self {
         let crossings = octree.crossings();
         let brick = &crossings.bricks()[i];
-        let plus = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1]]
-            .map(|steps| crossings.beside(brick, toward(steps)));
+        let plus = crossings.plus(brick);
         let [x, y, z] = &brick.crossed;
         let [px, py, pz, pxy, pxz, pyz] = plus.map(|b| &b.crossed);
         let edges = [

@@ -10,8 +10,8 @@
 //!
 //! Cost: about 60 ns and 76/80 bytes a mixed cell beyond the octree (a plane and 12 bytes a brick); positions are not kept.
 
+use super::PIECE;
 use super::cells::{Cells, EdgeTable};
-use super::stream::in_order;
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
@@ -22,6 +22,7 @@ use crate::grid::{Axis, Corner, Edge, Face, Key};
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
 use crate::octree::crossings::{Brick, Crossings, position, toward};
+use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
@@ -79,22 +80,27 @@ pub fn dual_contouring(
     };
     sink.begin(sizes)?;
     let mut sharp: Vec<Plane> = Vec::with_capacity(bricks);
+    let (count, piece) = pieces(bricks, PIECE);
     in_order(
-        bricks,
+        count,
         progress,
         Planes::new,
-        |table, range| layout.place_vertices(frame, options.placement, table, range),
-        |(points, planes)| {
-            sharp.extend(planes);
+        |planes, n| layout.place_vertices(frame, options.placement, planes, piece(n)),
+        |(points, creased)| {
+            progress.advance(PIECE as u64);
+            sharp.extend(creased);
             sink.points(&points)
         },
     )?;
     in_order(
-        bricks,
+        count,
         progress,
         || CellTable(Box::new([CellVertices::default(); CELL_SIDE.pow(3)])),
-        |table, range| layout.faces(&sharp, &polygons, options.triangles, table, range),
-        |faces| faces.pass_on(sink),
+        |table, n| layout.faces(&sharp, &polygons, options.triangles, table, piece(n)),
+        |faces| {
+            progress.advance(PIECE as u64);
+            faces.pass_on(sink)
+        },
     )?;
     Ok(sizes)
 }
@@ -295,8 +301,7 @@ impl<'a> Layout<'a> {
         table: &mut CellTable,
         range: Range<usize>,
     ) -> Faces {
-        let bricks = &self.octree.crossings().bricks()[range.clone()];
-        let quads = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
+        let quads = self.octree.crossings().places(range.clone()).len();
         let mut faces =
             Faces { triangles, corners: Vec::with_capacity(quads * if triangles { 6 } else { 4 }), others: Vec::new() };
         let from = extra.partition_point(|(brick, _)| *brick < range.start);

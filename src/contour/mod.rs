@@ -7,9 +7,11 @@
 mod cells;
 mod cubes;
 mod dual;
-mod stream;
 
 pub use cubes::marching_cubes;
+/// Bricks of a piece: some five thousand cells, whose points and faces stay in the cache until they are taken.
+const PIECE: usize = 64;
+
 pub use dual::{DualOptions, Placement, dual_contouring};
 
 #[cfg(test)]
@@ -44,7 +46,7 @@ mod tests {
                 }
             }
         }
-        parity_signs(Builder::new(DEPTH, true, 0, 0).finish().toggled(toggles))
+        parity_signs(Builder::new(DEPTH, true).finish().toggled(toggles))
     }
 
     fn frame() -> Frame {

@@ -57,7 +57,7 @@ mod tests {
             let axis = Axis::ALL[axis];
             let unit = DVec3::from(n).normalize();
             prop_assume!(unit[axis.index()].abs() > 1e-3);
-            let back = DVec3::from(NormalCode::encode(axis, n).decode(axis));
+            let back = NormalCode::encode(axis, n).decode(axis).as_dvec3();
             prop_assert!(back[axis.index()] >= 0.0);
             prop_assert!(unit.dot(back).abs().min(1.0).acos().to_degrees() < 0.6, "{unit} {back}");
             prop_assert_eq!(NormalCode::encode(axis, n.map(|c| -c)), NormalCode::encode(axis, n));

@@ -367,7 +367,7 @@ mod tests {
             edge: finest_element(depth, at, Extent::from(Axis::ALL[axis])),
             sample,
         };
-        Builder::new(depth, true, 0, 0).finish().toggled(list.iter().map(toggle).collect())
+        Builder::new(depth, true).finish().toggled(list.iter().map(toggle).collect())
     }
 
     proptest! {

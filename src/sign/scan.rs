@@ -20,6 +20,7 @@ use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
 use crate::mesh::{SourceCounts, TriangleSource};
 use crate::octree::crossings::{Builder, Crossings, Sample, Toggle, finest_element};
+use crate::parallel::in_order;
 use crate::progress::{Progress, Stage, check};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -119,36 +120,26 @@ struct Resolved {
     hits: u64,
 }
 
-/// Blocks that are resolved between two questions whether to go on.
-const BLOCKS_AT_ONCE: usize = 256;
-
 fn resolve(
-    mut blocks: Vec<(BlockCoords, Vec<Bucket>)>,
+    blocks: Vec<(BlockCoords, Vec<Bucket>)>,
     depth: u32,
     with_normals: bool,
     counts: &mut ScanCounts,
     progress: &dyn Progress,
 ) -> Result<Crossings> {
-    let mut resolved: Vec<Resolved> = Vec::with_capacity(blocks.len());
-    while !blocks.is_empty() {
-        check(progress)?;
-        let rest = blocks.split_off(blocks.len().min(BLOCKS_AT_ONCE));
-        let scratch = || (Vec::new(), Vec::new());
-        resolved.par_extend(std::mem::replace(&mut blocks, rest).into_par_iter().map_init(
-            scratch,
-            |(hits, spare), (block, buckets)| {
-                hits.clear();
-                buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
-                sort_hits(hits, spare);
-                resolve_block(block, hits, depth, with_normals)
-            },
-        ));
-    }
-    let bricks = resolved.iter().map(|r| r.bricks.len()).sum();
-    let edges = resolved.iter().map(|r| r.offsets.len()).sum();
-    let mut builder = Builder::new(depth, with_normals, bricks, edges);
+    // Each block's hits are given back when it is resolved.
+    let blocks: Vec<Mutex<_>> = blocks.into_iter().map(|block| Mutex::new(Some(block))).collect();
+    let resolve = |(hits, spare): &mut (Vec<Hit>, Vec<Hit>), n: usize| {
+        let block = blocks[n].lock().expect("locked once").take();
+        let (block, buckets) = block.expect("each block is resolved once");
+        hits.clear();
+        buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
+        sort_hits(hits, spare);
+        resolve_block(block, hits, depth, with_normals)
+    };
+    let mut builder = Builder::new(depth, with_normals);
     let mut merges = Vec::new();
-    for block in resolved {
+    let append = |block: Resolved| {
         let mut from = 0;
         for &(key, crossed) in &block.bricks {
             let to = from + crossed.iter().map(Plane::count).sum::<u32>() as usize;
@@ -158,7 +149,9 @@ fn resolve(
         }
         merges.extend(block.merges);
         counts.hits += block.hits;
-    }
+        Ok(())
+    };
+    in_order(blocks.len(), progress, Default::default, resolve, append)?;
     let crossings = builder.finish();
     let merges = walls::worth_merging(&crossings, merges);
     counts.merged_walls = merges.len() as u64;
