@@ -209,6 +209,23 @@ fn every_format_and_surface_is_read_back_closed() {
     folder.run("info odd.stl").ok().says(&["OFF (text)", "a solid"]);
 }
 
+/// In the cells along its tip both sides of the wedge have a vertex, and both were put where the sides meet: 270 pairs of
+/// vertices at one place, which STL joined.
+#[test]
+fn both_sides_of_a_thin_wedge_stay_apart_in_stl() {
+    let folder = Folder::new();
+    let wedge = "OFF\n6 5 0\n\
+        0.742 0.672 0\n0.672 0.742 0\n0 0 0\n0.742 0.672 1\n0.672 0.742 1\n0 0 1\n\
+        3 2 1 0\n3 3 4 5\n4 0 1 4 3\n4 1 2 5 4\n4 2 0 3 5\n";
+    fs::write(folder.path("wedge.off"), wedge).unwrap();
+    for surface in ["mc", "dc", "quads"] {
+        for depth in [4, 5, 6] {
+            folder.run(&format!("repair wedge.off fixed.stl -q -f -d {depth} -s {surface}")).ok();
+            assert_solid(&folder.path("fixed.stl"));
+        }
+    }
+}
+
 #[test]
 fn quiet_says_nothing() {
     let folder = Folder::new();
