@@ -353,6 +353,10 @@ fn middle(points: &[DVec3]) -> DVec3 {
 
 /// Vertices keep this distance from the sides of their cell, in cells.
 const CELL_MARGIN: f32 = 1.0 / 1024.0;
+/// How far each of several vertices of a cell is drawn to its own mass point. Two sheets can have one minimiser, as both sides of
+/// a thin edge do, and files that tell vertices apart by position only, as STL does, would join them: the trailing edge
+/// of a wing came back with 33 non-manifold edges.
+const APART: f32 = 1.0 / 64.0;
 
 /// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
 const CREASED: f32 = 0.933;
@@ -433,7 +437,8 @@ impl Planes {
             let common = solve(cell, placement, &sum);
             creased |= is_creased(placement, &sum);
             if case.sheets.is_regular(sheet) {
-                place(common);
+                let apart = if case.sheets.count > 1 { APART } else { 0.0 };
+                place(common.lerp(sum.mass_point(), apart));
                 continue;
             }
             // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.

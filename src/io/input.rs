@@ -4,7 +4,7 @@ use super::ply::{self, PlyFile};
 use super::stl::{self, StlFile};
 use super::{Encoding, Format};
 use crate::error::{Error, Result};
-use crate::mesh::{Bounds, SourceCounts, TriangleSource};
+use crate::mesh::{Bounds, Mesh, SourceCounts, TriangleSource};
 use glam::DVec3;
 use std::fs::File;
 use std::io::Read;
@@ -19,7 +19,13 @@ const PREFIX: u64 = 1 << 20;
 /// all else is held as a [`Mesh`](crate::Mesh).
 pub struct Input {
     info: InputInfo,
-    source: Box<dyn TriangleSource + Send>,
+    source: Source,
+}
+
+/// Where the triangles are.
+enum Source {
+    Memory(Mesh),
+    File(Box<dyn TriangleSource + Send>),
 }
 
 /// What is known of an input file before its triangles are read.
@@ -91,7 +97,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Input> {
         is_streamed: false,
         trailing_bytes: parsed.trailing_bytes,
     };
-    Ok(Input { info, source: Box::new(parsed.mesh) })
+    Ok(Input { info, source: Source::Memory(parsed.mesh) })
 }
 
 /// Opens a file that need not be held in memory, or gives `None` when it must.
@@ -130,13 +136,35 @@ fn open_streamed(path: &Path, file: File, len: u64, prefix: &[u8]) -> Result<Opt
         },
         _ => return Ok(None),
     };
-    Ok(Some(Input { info, source }))
+    Ok(Some(Input { info, source: Source::File(source) }))
 }
 
 impl Input {
     /// What is known of the file.
     pub fn info(&self) -> &InputInfo {
         &self.info
+    }
+
+    /// The whole mesh, unless it is streamed.
+    pub fn mesh(&self) -> Option<&Mesh> {
+        match &self.source {
+            Source::Memory(mesh) => Some(mesh),
+            Source::File(_) => None,
+        }
+    }
+
+    fn source(&self) -> &dyn TriangleSource {
+        match &self.source {
+            Source::Memory(mesh) => mesh,
+            Source::File(file) => file.as_ref(),
+        }
+    }
+
+    fn source_mut(&mut self) -> &mut dyn TriangleSource {
+        match &mut self.source {
+            Source::Memory(mesh) => mesh,
+            Source::File(file) => file.as_mut(),
+        }
     }
 }
 
@@ -148,15 +176,15 @@ impl std::fmt::Debug for Input {
 
 impl TriangleSource for Input {
     fn bounds(&mut self) -> Result<Bounds> {
-        self.source.bounds()
+        self.source_mut().bounds()
     }
 
     fn triangles(&mut self, sink: &mut dyn FnMut(&[[DVec3; 3]]) -> Result<()>) -> Result<SourceCounts> {
-        self.source.triangles(sink)
+        self.source_mut().triangles(sink)
     }
 
     fn size_hint(&self) -> Option<u64> {
-        self.source.size_hint()
+        self.source().size_hint()
     }
 }
 
