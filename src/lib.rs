@@ -8,6 +8,7 @@ pub mod grid;
 pub mod io;
 pub mod mesh;
 pub mod octree;
+mod parallel;
 pub mod progress;
 #[cfg(feature = "render")]
 pub mod render;

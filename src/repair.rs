@@ -109,11 +109,15 @@ impl fmt::Display for Warning {
                 f,
                 "the input encloses nothing at this resolution: open sheets and walls thinner than a cell vanish; try a greater depth"
             ),
+            Warning::SkippedTriangles(1) => {
+                write!(f, "a triangle with coordinates that are not finite was left out")
+            }
             Warning::SkippedTriangles(n) => {
                 write!(f, "{n} triangles with coordinates that are not finite were left out")
             }
-            Warning::HolesClosed(n) => write!(f, "the surface was open: {n} holes were closed"),
-            Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (on {n} grid edges)"),
+            Warning::HolesClosed(1) => write!(f, "the surface was open: a hole was closed"),
+            Warning::HolesClosed(n) => write!(f, "the surface was open: {n} holes, as the grid sees them, were closed"),
+            Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (grid edges concerned: {n})"),
         }
     }
 }

@@ -105,10 +105,12 @@ fn long_faces_are_written_with_long_counts() {
     let points = (0..300).map(|i| DVec3::new(f64::from(i), f64::from(i * i), 0.0)).collect();
     let mut mesh = Mesh { points, ..Mesh::default() };
     mesh.faces.push(&(0..300).collect::<Vec<u32>>());
-    for name in ["a.ply", "a.obj", "a.off"] {
+    for (name, is_text) in [("a.ply", false), ("a.ply", true), ("a.obj", true), ("a.off", true)] {
         let path = directory.path().join(name);
-        io::write(&path, &mesh, WriteOptions::default()).expect("written");
+        io::write(&path, &mesh, WriteOptions { is_text, ..WriteOptions::default() }).expect("written");
         assert_eq!(io::read(&path).expect("readable"), mesh, "{name}");
+        let has_long_counts = std::fs::read(&path).expect("there").windows(9).any(|w| w == b"list uint");
+        assert_eq!(has_long_counts, name == "a.ply");
     }
 }
 

@@ -4,7 +4,7 @@ use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::Mask;
 use crate::grid::{Axis, Edge};
 use crate::octree::SignedOctree;
-use crate::octree::crossings::{Brick, toward};
+use crate::octree::crossings::Brick;
 
 /// For each cell of a brick (named by its least corner): which of its edges are crossed, which of its corners are inside.
 pub(super) struct Cells<'a> {
@@ -22,8 +22,7 @@ impl<'a> Cells<'a> {
     pub(super) fn new(octree: &'a SignedOctree, i: usize) -> Self {
         let crossings = octree.crossings();
         let brick = &crossings.bricks()[i];
-        let plus = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1]]
-            .map(|steps| crossings.beside(brick, toward(steps)));
+        let plus = crossings.plus(brick);
         let [x, y, z] = &brick.crossed;
         let [px, py, pz, pxy, pxz, pyz] = plus.map(|b| &b.crossed);
         let edges = [
@@ -71,6 +70,25 @@ impl<'a> Cells<'a> {
         diagonals.iter().fold(ambiguous, |a, (at, others)| a | (all(at) & none(others)))
     }
 
+    /// Calls `each` with every mixed cell and its corners that are inside.
+    #[inline]
+    pub(super) fn for_mixed(&self, mut each: impl FnMut(Local, Mask)) {
+        let mixed = self.mixed();
+        for x in 0..8 {
+            let mut word = mixed.0[x];
+            while word != 0 {
+                // Eight cells along z: their bits in eight planes are eight masks, transposed.
+                let row = word.trailing_zeros() & !7;
+                let bits = self.corners.map(|plane| (plane.0[x] >> row) as u8);
+                let masks = transposed(u64::from_le_bytes(bits)).to_le_bytes();
+                for z in Bits(word >> row & 0xff) {
+                    each(Local::from_index(x as u32 * 64 + row + z), masks[z as usize]);
+                }
+                word &= !(0xff << row);
+            }
+        }
+    }
+
     /// The corners of a cell that are inside.
     #[inline]
     pub(super) fn mask(&self, cell: Local) -> Mask {
@@ -84,109 +102,160 @@ impl<'a> Cells<'a> {
     }
 }
 
+/// The transposed matrix of 8 x 8 bits, a row in each byte (Warren, Hacker's Delight, 7-3).
+fn transposed(mut bits: u64) -> u64 {
+    for (distance, mask) in [(7, 0x00aa_00aa_00aa_00aa), (14, 0x0000_cccc_0000_cccc), (28, 0x0000_0000_f0f0_f0f0)] {
+        let swap = (bits ^ bits >> distance) & mask;
+        bits ^= swap ^ swap << distance;
+    }
+    bits
+}
+
 /// Positions a side of the table: a brick and the next layer.
 const SIDE: usize = 9;
 /// Positions of the table for one axis.
 const LAYER: usize = SIDE * SIDE * SIDE;
+/// Entries before a position's for one step along each axis.
+const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
+
+/// A crossed edge as a brick sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    pub(super) axis: Axis,
+    /// Its start, in cells from the least corner of the brick, 0 ..= 8 each.
+    pub(super) start: [u32; 3],
+    /// Its place in the arrays of the octree.
+    pub(super) number: u32,
+    /// Whether its start is inside, and so its end outside.
+    pub(super) starts_inside: bool,
+}
 
 /// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale.
-pub(super) struct EdgeTable<T>([Box<[T; LAYER]>; 3]);
+pub(super) struct EdgeTable<T>(Box<[T; 3 * LAYER]>);
 
 /// Where bit b of a plane's word stands in a layer of the table.
 static AT: [u8; 64] = {
     let mut at = [0; 64];
     let mut b = 0;
     while b < 64 {
-        at[b] = ((b >> 3) * SIDE + (b & 7)) as u8;
+        at[b] = ((b >> 3) * STEP[1] + (b & 7)) as u8;
         b += 1;
+    }
+    at
+};
+
+/// How far the entry of each edge of a cell is from that of its first edge.
+static EDGE_AT: [u16; 12] = {
+    let mut at = [0; 12];
+    let mut i = 0;
+    while i < 12 {
+        let start = Edge::ALL[i].corners()[0];
+        let mut sum = Edge::ALL[i].axis().index() * LAYER;
+        let mut a = 0;
+        while a < 3 {
+            if start.is_high(Axis::ALL[a]) {
+                sum += STEP[a];
+            }
+            a += 1;
+        }
+        at[i] = sum as u16;
+        i += 1;
     }
     at
 };
 
 impl<T: Copy> EdgeTable<T> {
     pub(super) fn new(empty: T) -> Self {
-        EdgeTable(std::array::from_fn(|_| Box::new([empty; LAYER])))
+        EdgeTable(Box::new([empty; 3 * LAYER]))
     }
 
-    /// The entry of an edge of a cell of the brick last filled in. The edge must be crossed.
+    /// The entries of the edges of a cell of the brick last filled in. Only crossed edges have any.
     #[inline]
-    pub(super) fn get(&self, cell: Local, edge: Edge) -> T {
+    pub(super) fn at(&self, cell: Local) -> impl Fn(Edge) -> T + '_ {
         let [x, y, z] = cell.coords().map(|c| c as usize);
-        self.0[edge.index() >> 2][(x * SIDE + y) * SIDE + z + usize::from(EDGE_STEP[edge.index()])]
+        let entries = &self.0[x * STEP[0] + y * STEP[1] + z..];
+        move |edge| entries[usize::from(EDGE_AT[edge.index()])]
     }
 
-    /// Makes an entry for each crossing round the cells of a brick, from its axis and its number.
-    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(usize, u32) -> T) {
+    /// Makes an entry for each crossing round the cells of a brick.
+    #[inline]
+    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Crossing) -> T) {
+        const LOW_Y: u64 = 0xff;
+        const LOW_Z: u64 = 0x0101_0101_0101_0101;
         let mut number = cells.brick.first;
-        for (axis, plane) in cells.brick.crossed.iter().enumerate() {
+        for (axis, plane) in Axis::ALL.into_iter().zip(&cells.brick.crossed) {
             for (x, &word) in plane.0.iter().enumerate() {
+                let inside = cells.corners[0].0[x];
                 for b in Bits(word) {
-                    self.0[axis][x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, number);
+                    let start = [x as u32, b >> 3, b & 7];
+                    self.0[axis.index() * LAYER + x * STEP[0] + usize::from(AT[b as usize])] =
+                        entry(Crossing { axis, start, number, starts_inside: inside >> b & 1 == 1 });
                     number += 1;
                 }
             }
         }
-        const LOW_Y: u64 = 0xff;
-        const LOW_Z: u64 = 0x0101_0101_0101_0101;
         let [px, py, pz, pxy, pxz, pyz] = cells.plus;
-        self.fill_layer(px, &[1, 2], [8, 0, 0], !0, &mut entry);
-        self.fill_layer(py, &[0, 2], [0, 8, 0], LOW_Y, &mut entry);
-        self.fill_layer(pz, &[0, 1], [0, 0, 8], LOW_Z, &mut entry);
-        self.fill_layer(pxy, &[2], [8, 8, 0], LOW_Y, &mut entry);
-        self.fill_layer(pxz, &[1], [8, 0, 8], LOW_Z, &mut entry);
-        self.fill_layer(pyz, &[0], [0, 8, 8], LOW_Y & LOW_Z, &mut entry);
+        for (brick, axes, start, select) in [
+            (px, &[Axis::Y, Axis::Z][..], [8, 0, 0], !0),
+            (py, &[Axis::X, Axis::Z], [0, 8, 0], LOW_Y),
+            (pz, &[Axis::X, Axis::Y], [0, 0, 8], LOW_Z),
+            (pxy, &[Axis::Z], [8, 8, 0], LOW_Y),
+            (pxz, &[Axis::Y], [8, 0, 8], LOW_Z),
+            (pyz, &[Axis::X], [0, 8, 8], LOW_Y & LOW_Z),
+        ] {
+            for &axis in axes {
+                self.fill_layer(brick, &cells.corners, axis, start, select, &mut entry);
+            }
+        }
     }
 
-    /// The same for the layer of a neighbouring brick that touches this one: its edges along `axes` at the selected bits.
+    /// The same for the edges along `axis` of a neighbouring brick at the selected bits, in the layer that touches this brick, which
+    /// starts at `start`.
     fn fill_layer(
         &mut self,
         brick: &Brick,
-        axes: &[usize],
-        [x0, y0, z0]: [usize; 3],
+        corners: &[Plane; 8],
+        axis: Axis,
+        start: [u32; 3],
         select: u64,
-        entry: &mut impl FnMut(usize, u32) -> T,
+        entry: &mut impl FnMut(Crossing) -> T,
     ) {
-        let at = (x0 * SIDE + y0) * SIDE + z0;
-        let words = if x0 == 0 { 8 } else { 1 };
-        let mut number = brick.first;
-        for (axis, plane) in brick.crossed.iter().enumerate() {
-            if axes.contains(&axis) {
-                let mut before = number;
-                for (x, &word) in plane.0[..words].iter().enumerate() {
-                    for b in Bits(word & select) {
-                        let below = (word & ((1 << b) - 1)).count_ones();
-                        self.0[axis][at + x * SIDE * SIDE + usize::from(AT[b as usize])] = entry(axis, before + below);
-                    }
-                    before += word.count_ones();
-                }
-                if axes.last() == Some(&axis) {
-                    break;
-                }
+        let [x0, y0, z0] = start.map(|c| c as usize);
+        let at = axis.index() * LAYER + x0 * STEP[0] + y0 * STEP[1] + z0;
+        let words = &brick.crossed[axis.index()].0[..if x0 == 0 { 8 } else { 1 }];
+        if words.iter().all(|word| word & select == 0) {
+            return;
+        }
+        // The layer's points are corners of the brick's last cells: which corners, and how far on their bits are.
+        let [high_x, high_y, high_z] = start.map(|c| c >> 3);
+        let corner = &corners[(high_x << 2 | high_y << 1 | high_z) as usize];
+        let last = 56 * high_y + 7 * high_z;
+        let mut before = brick.first + brick.crossed[..axis.index()].iter().map(Plane::count).sum::<u32>();
+        for (x, &word) in words.iter().enumerate() {
+            let inside = corner.0[if high_x == 1 { 7 } else { x }] >> last;
+            for b in Bits(word & select) {
+                let number = before + (word & ((1 << b) - 1)).count_ones();
+                let start = [start[0] + x as u32, start[1] + (b >> 3), start[2] + (b & 7)];
+                self.0[at + x * STEP[0] + usize::from(AT[b as usize])] =
+                    entry(Crossing { axis, start, number, starts_inside: inside >> b & 1 == 1 });
             }
-            number += plane.count();
+            before += word.count_ones();
         }
     }
 }
 
-/// How far the start of each edge of a cell is from the cell's own place in a layer of the table.
-static EDGE_STEP: [u8; 12] = {
-    let mut step = [0; 12];
-    let mut i = 0;
-    while i < 12 {
-        let edge = Edge::ALL[i];
-        let corner = edge.corners()[0];
-        let mut s = 0;
-        if corner.is_high(Axis::X) {
-            s += SIDE * SIDE;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn transposing_swaps_rows_and_columns(bits: u64) {
+            let transposed = transposed(bits);
+            for (i, j) in (0..8).flat_map(|i| (0..8).map(move |j| (i, j))) {
+                prop_assert_eq!(bits >> (8 * i + j) & 1, transposed >> (8 * j + i) & 1);
+            }
         }
-        if corner.is_high(Axis::Y) {
-            s += SIDE;
-        }
-        if corner.is_high(Axis::Z) {
-            s += 1;
-        }
-        step[i] = s as u8;
-        i += 1;
     }
-    step
-};
+}

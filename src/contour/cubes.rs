@@ -7,8 +7,8 @@
 //! The result is closed and manifold for any signs: segments on faces match, and no inner edge lies in a face (tests of
 //! [`cases`](crate::grid::cases)). Triangles stay in their cells, so different cells' never intersect.
 
+use super::PIECE;
 use super::cells::{Cells, EdgeTable};
-use super::stream::in_order;
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::grid::brick::Local;
@@ -16,6 +16,7 @@ use crate::grid::cases::CASES;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
 use crate::octree::crossings::{Crossings, position};
+use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -38,13 +39,34 @@ pub fn marching_cubes(
     let triangles = count_triangles(octree);
     let sizes = MeshSizes { points: crossings.len() as u64, faces: triangles, corners: 3 * triangles };
     sink.begin(sizes)?;
-    in_order(bricks, progress, || (), |(), range| points(crossings, frame, range), |points| sink.points(&points))?;
-    let faces = |numbers: &mut EdgeTable<u32>, range| triangles_of(octree, numbers, range);
-    in_order(bricks, progress, || EdgeTable::new(0), faces, |corners| sink.faces(3, &corners))?;
+    let (count, piece) = pieces(bricks, PIECE);
+    let points = |(): &mut (), n| points(crossings, frame, piece(n));
+    in_order(
+        count,
+        progress,
+        || (),
+        points,
+        |points| {
+            progress.advance(PIECE as u64);
+            sink.points(&points)
+        },
+    )?;
+    let triangles = |numbers: &mut EdgeTable<u32>, n| triangles_of(octree, numbers, piece(n));
+    in_order(
+        count,
+        progress,
+        || EdgeTable::new(0),
+        triangles,
+        |corners| {
+            progress.advance(PIECE as u64);
+            sink.faces(3, &corners)
+        },
+    )?;
     Ok(sizes)
 }
 
 /// The number of triangles of the whole surface.
+#[inline(never)]
 fn count_triangles(octree: &SignedOctree) -> u64 {
     let of_brick = |i: usize| {
         let cells = Cells::new(octree, i);
@@ -58,39 +80,38 @@ fn count_triangles(octree: &SignedOctree) -> u64 {
     (4 * octree.crossings().len() as i64 + corrections) as u64
 }
 
+#[inline(never)]
 fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
-    let bricks = &crossings.bricks()[range];
-    let first = bricks.first().map_or(0, |b| b.first as usize);
-    let end = bricks.last().map_or(0, |b| (b.first + b.count()) as usize);
-    let mut points = Vec::with_capacity(end - first);
-    let mut offsets = crossings.offsets()[first..end].iter();
-    for brick in bricks {
-        let origin = crossings.origin(brick).map(f64::from);
+    let places = crossings.places(range.clone());
+    let mut points = Vec::with_capacity(places.len());
+    let mut place = places.start;
+    for brick in range.map(|i| &crossings.bricks()[i]) {
+        let origin = DVec3::from(crossings.origin(brick).map(f64::from));
         for (axis, plane) in brick.crossed.iter().enumerate() {
-            for local in plane.iter() {
-                let c = local.coords();
-                let mut p: [f64; 3] = std::array::from_fn(|a| origin[a] + f64::from(c[a]));
-                p[axis] += position(*offsets.next().expect("one offset a crossing"));
-                points.push(frame.to_model(DVec3::from(p)));
-            }
+            let along = DVec3::AXES[axis];
+            plane.iter().for_each(|local| {
+                let [x, y, z] = local.coords().map(f64::from);
+                let offset = position(crossings.offsets()[place]);
+                points.push(frame.to_model(origin + DVec3::new(x, y, z) + along * offset));
+                place += 1;
+            });
         }
     }
     points
 }
 
+#[inline(never)]
 fn triangles_of(octree: &SignedOctree, numbers: &mut EdgeTable<u32>, range: Range<usize>) -> Vec<u32> {
-    let bricks = &octree.crossings().bricks()[range.clone()];
-    let crossed = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
-    let mut corners = Vec::with_capacity(7 * crossed);
+    let mut corners = Vec::with_capacity(7 * octree.crossings().places(range.clone()).len());
+    let cases = &*CASES;
     for i in range {
         let cells = Cells::new(octree, i);
-        numbers.fill(&cells, |_, number| number);
-        for cell in cells.mixed().iter() {
-            let case = &CASES[usize::from(cells.mask(cell))];
-            for triangle in &case.triangles {
-                corners.extend(triangle.map(|edge| numbers.get(cell, edge)));
-            }
-        }
+        numbers.fill(&cells, |crossing| crossing.number);
+        cells.for_mixed(|cell, mask| {
+            let triangles = &cases[usize::from(mask)].triangles;
+            let point = numbers.at(cell);
+            corners.extend(triangles.as_flattened().iter().map(|&edge| point(edge)));
+        });
     }
     corners
 }

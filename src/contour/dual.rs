@@ -10,8 +10,8 @@
 //!
 //! Cost: about 60 ns and 76/80 bytes a mixed cell beyond the octree (a plane and 12 bytes a brick); positions are not kept.
 
-use super::cells::{Cells, EdgeTable};
-use super::stream::in_order;
+use super::PIECE;
+use super::cells::{Cells, Crossing, EdgeTable};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
@@ -21,9 +21,10 @@ use crate::grid::cases::{CASES, Mask, inside_end};
 use crate::grid::{Axis, Corner, Edge, Face, Key};
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
-use crate::octree::crossings::{Brick, position, toward};
+use crate::octree::crossings::{Brick, Crossings, position, toward};
+use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -79,31 +80,29 @@ pub fn dual_contouring(
     };
     sink.begin(sizes)?;
     let mut sharp: Vec<Plane> = Vec::with_capacity(bricks);
+    let (count, piece) = pieces(bricks, PIECE);
     in_order(
-        bricks,
+        count,
         progress,
-        || EdgeTable::new(Tangent::default()),
-        |table, range| layout.place_vertices(frame, options.placement, table, range),
-        |(points, planes)| {
-            sharp.extend(planes);
+        Planes::new,
+        |planes, n| layout.place_vertices(frame, options.placement, planes, piece(n)),
+        |(points, creased)| {
+            progress.advance(PIECE as u64);
+            sharp.extend(creased);
             sink.points(&points)
         },
     )?;
     in_order(
-        bricks,
+        count,
         progress,
         || CellTable(Box::new([CellVertices::default(); CELL_SIDE.pow(3)])),
-        |table, range| layout.faces(&sharp, &polygons, options.triangles, table, range),
-        |faces| faces.pass_on(sink),
+        |table, n| layout.faces(&sharp, &polygons, options.triangles, table, piece(n)),
+        |faces| {
+            progress.advance(PIECE as u64);
+            faces.pass_on(sink)
+        },
     )?;
     Ok(sizes)
-}
-
-/// A crossing as the cells beside it see it: position along the edge, and unit normal with the component along the edge positive.
-#[derive(Debug, Clone, Copy, Default)]
-struct Tangent {
-    position: f32,
-    normal: Vec3,
 }
 
 /// A mixed cell whose vertices are not the ordinary single one.
@@ -165,16 +164,14 @@ impl<'a> Layout<'a> {
         let mut knots = self.knots_of(brick).iter().peekable();
         for (x, &word) in mixed.0.iter().enumerate() {
             let selected = select(x);
-            if selected != 0 {
-                for b in Bits(word & selected) {
-                    let cell = Local::from_index(x as u32 * 64 + b);
-                    while let Some(knot) = knots.next_if(|k| k.cell < cell) {
-                        before += knot.extra_vertices();
-                    }
-                    let below = (word & ((1 << b) - 1)).count_ones();
-                    let mask = knots.peek().filter(|k| k.cell == cell).map_or(0, |k| k.mask);
-                    each(cell, before + below, mask);
+            for b in Bits(word & selected) {
+                let cell = Local::from_index(x as u32 * 64 + b);
+                while let Some(knot) = knots.next_if(|k| k.cell < cell) {
+                    before += knot.extra_vertices();
                 }
+                let below = (word & ((1 << b) - 1)).count_ones();
+                let mask = knots.peek().filter(|k| k.cell == cell).map_or(0, |k| k.mask);
+                each(cell, before + below, mask);
             }
             before += word.count_ones();
         }
@@ -260,45 +257,42 @@ impl<'a> Layout<'a> {
     }
 
     /// The points of the vertices of some bricks, and the planes of their cells with sharp features.
+    #[inline(never)]
     fn place_vertices(
         &self,
         frame: &Frame,
         placement: Placement,
-        table: &mut EdgeTable<Tangent>,
+        planes: &mut Planes,
         range: Range<usize>,
     ) -> (Vec<DVec3>, Vec<Plane>) {
         let crossings = self.octree.crossings();
         let first = self.bricks[range.start].first;
         let end = self.bricks.get(range.end).map_or(self.vertices, |b| u64::from(b.first));
         let mut points = Vec::with_capacity((end - u64::from(first)) as usize);
-        let mut planes = Vec::with_capacity(range.len());
+        let mut creased = Vec::with_capacity(range.len());
         for i in range {
             let cells = Cells::new(self.octree, i);
-            table.fill(&cells, |axis, number| Tangent {
-                position: position(crossings.offsets()[number as usize]) as f32,
-                normal: match placement {
-                    Placement::SharpFeatures => {
-                        NormalCode(crossings.normals()[number as usize]).decode(Axis::ALL[axis]).as_vec3()
-                    }
-                    Placement::MassPoint => Vec3::ZERO,
-                },
-            });
+            planes.fill(&cells, crossings, placement);
             let origin = DVec3::from(crossings.origin(cells.brick()).map(f64::from));
-            let mut sharp = Plane::EMPTY;
-            for cell in cells.mixed().iter() {
-                let corner = origin + DVec3::from(cell.coords().map(f64::from));
-                let mask = cells.mask(cell);
-                let tangents = |edge: Edge| table.get(cell, edge);
-                let is_sharp = place_in_cell(mask, placement, tangents, |p| points.push(frame.to_model(corner + p)));
-                if is_sharp {
-                    sharp.set(cell);
+            let mut of_brick = Plane::EMPTY;
+            let mixed = cells.mixed();
+            let mut knots = self.knots_of(i).iter().peekable();
+            mixed.iter().for_each(|cell| {
+                let place = |p: Vec3A| points.push(frame.to_model(origin + p.as_dvec3()));
+                let is_creased = match knots.next_if(|k| k.cell == cell) {
+                    None => planes.place_ordinary(cell, placement, place),
+                    Some(knot) => planes.place_knot(*knot, placement, place),
+                };
+                if is_creased {
+                    of_brick.set(cell);
                 }
-            }
-            planes.push(sharp);
+            });
+            creased.push(of_brick);
         }
-        (points, planes)
+        (points, creased)
     }
 
+    #[inline(never)]
     fn faces(
         &self,
         sharp: &[Plane],
@@ -307,8 +301,7 @@ impl<'a> Layout<'a> {
         table: &mut CellTable,
         range: Range<usize>,
     ) -> Faces {
-        let bricks = &self.octree.crossings().bricks()[range.clone()];
-        let quads = bricks.last().map_or(0, |b| (b.first + b.count() - bricks[0].first) as usize);
+        let quads = self.octree.crossings().places(range.clone()).len();
         let mut faces =
             Faces { triangles, corners: Vec::with_capacity(quads * if triangles { 6 } else { 4 }), others: Vec::new() };
         let from = extra.partition_point(|(brick, _)| *brick < range.start);
@@ -359,70 +352,125 @@ fn middle(points: &[DVec3]) -> DVec3 {
 }
 
 /// Vertices keep this distance from the sides of their cell, in cells.
-const CELL_MARGIN: f64 = 1.0 / 1024.0;
+const CELL_MARGIN: f32 = 1.0 / 1024.0;
+/// How far each of several vertices of a cell is drawn to its own mass point. Two sheets can have one minimiser, as both sides of
+/// a thin edge do, and files that tell vertices apart by position only, as STL does, would join them: the trailing edge
+/// of a wing came back with 33 non-manifold edges.
+const APART: f32 = 1.0 / 64.0;
 
 /// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
-const CREASED: f64 = 0.933;
+const CREASED: f32 = 0.933;
 
-/// Calls `place` with the vertices of a cell, in cells from its least corner. Returns whether the cell has a crease or corner.
-#[inline]
-fn place_in_cell(
-    mask: Mask,
-    placement: Placement,
-    tangent: impl Fn(Edge) -> Tangent,
-    mut place: impl FnMut(DVec3),
-) -> bool {
-    let case = &CASES[usize::from(mask)];
-    let crossing = |edge: Edge| {
-        let start = edge.corners()[0];
-        let t = tangent(edge);
-        let mut p = Axis::ALL.map(|a| f64::from(u8::from(start & a)));
-        p[edge.axis().index()] = f64::from(t.position);
-        let n = t.normal.as_dvec3();
-        // Outward: from the inside end to the other.
-        (DVec3::from(p), if mask >> start.index() & 1 == 1 { n } else { -n })
-    };
-    let solve = |qef: &Qef| {
-        let p = match placement {
-            Placement::SharpFeatures => qef.minimiser(),
-            Placement::MassPoint => qef.mass_point(),
-        };
-        p.clamp(DVec3::splat(CELL_MARGIN), DVec3::splat(1.0 - CELL_MARGIN))
-    };
-    let creased = |qef: &Qef| placement == Placement::SharpFeatures && qef.flatness() < CREASED;
-    if let ([cycle], true) = (&case.cycles[..], case.sheets.vertices == 1) {
-        let mut qef = Qef::default();
-        cycle.iter().for_each(|&edge| {
-            let (p, n) = crossing(edge);
-            qef.add(p, n);
+/// The tangent planes at the crossings round the cells of a brick, in cells from its least corner, and what they add up to for
+/// each cell.
+struct Planes {
+    /// Point and outward unit normal of each crossing.
+    tangents: EdgeTable<(Vec3A, Vec3A)>,
+    /// For each cell, and those round the brick, whose sums are never read. Cells without crossings have empty sums.
+    sums: Box<[Qef; SUM_SIDE.pow(3)]>,
+}
+
+/// Cells a side of the table of sums: a brick and a layer on both sides.
+const SUM_SIDE: usize = 10;
+/// Entries before that of a cell for one step along each axis.
+const SUM_STEP: [usize; 3] = [SUM_SIDE * SUM_SIDE, SUM_SIDE, 1];
+/// For each axis, how far the four cells round an edge are before the one that starts where it does.
+const ROUND_EDGE: [[usize; 4]; 3] = {
+    let [x, y, z] = SUM_STEP;
+    [[0, y, z, y + z], [0, x, z, x + z], [0, x, y, x + y]]
+};
+
+impl Planes {
+    fn new() -> Self {
+        Planes { tangents: EdgeTable::new((Vec3A::ZERO, Vec3A::ZERO)), sums: Box::new([Qef::EMPTY; SUM_SIDE.pow(3)]) }
+    }
+
+    fn sum_at([x, y, z]: [u32; 3]) -> usize {
+        (x as usize + 1) * SUM_STEP[0] + (y as usize + 1) * SUM_STEP[1] + z as usize + 1
+    }
+
+    fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement) {
+        let sums = &mut self.sums;
+        self.tangents.fill(cells, |Crossing { axis, start, number, starts_inside }| {
+            let offset = position(crossings.offsets()[number as usize]) as f32;
+            let point = Vec3A::from(start.map(|c| c as f32)) + offset * Vec3A::AXES[axis.index()];
+            let normal = match placement {
+                Placement::SharpFeatures => NormalCode(crossings.normals()[number as usize]).decode(axis),
+                Placement::MassPoint => Vec3A::ZERO,
+            };
+            // Decoded normals point to the high end of the edge.
+            let normal = if starts_inside { normal } else { -normal };
+            let plane = Qef::of_plane(point, normal);
+            let last = Self::sum_at(start);
+            ROUND_EDGE[axis.index()].iter().for_each(|step| sums[last - step] += &plane);
+            (point, normal)
         });
-        place(solve(&qef));
-        return creased(&qef);
     }
-    let mut sharp = false;
-    for sheet in 0..case.sheets.count {
-        let mut qef = Qef::default();
-        let of_sheet = || {
-            let sheet_of = |edge| case.sheets.sheet[inside_end(mask, edge).index()];
-            case.cycles.iter().flatten().copied().filter(move |&edge| sheet_of(edge) == sheet)
-        };
-        of_sheet().map(&crossing).for_each(|(p, n)| qef.add(p, n));
-        let common = solve(&qef);
-        sharp |= creased(&qef);
-        if case.sheets.is_regular(sheet) {
-            place(common);
-            continue;
-        }
-        // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.
-        for corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
-            let around: Vec<DVec3> =
-                of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| crossing(e).0).collect();
-            let own =
-                if around.is_empty() { middle(&[point([0; 3], corner), DVec3::splat(0.5)]) } else { middle(&around) };
-            place(own.lerp(common, 0.25));
-        }
+
+    /// The sum for a cell, which is empty from then on.
+    fn take_sum(&mut self, cell: Local) -> Qef {
+        std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
     }
-    sharp
+
+    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick. Returns whether the cell has
+    /// a crease or corner.
+    #[inline]
+    fn place_ordinary(&mut self, cell: Local, placement: Placement, mut place: impl FnMut(Vec3A)) -> bool {
+        let sum = self.take_sum(cell);
+        place(solve(cell, placement, &sum));
+        is_creased(placement, &sum)
+    }
+
+    /// The same for a cell with several sheets or vertices.
+    fn place_knot(&mut self, Knot { cell, mask }: Knot, placement: Placement, mut place: impl FnMut(Vec3A)) -> bool {
+        self.take_sum(cell);
+        let case = &CASES[usize::from(mask)];
+        let tangent = self.tangents.at(cell);
+        let mut creased = false;
+        for sheet in 0..case.sheets.count {
+            let of_sheet = || {
+                let sheet_of = |edge| case.sheets.sheet[inside_end(mask, edge).index()];
+                case.cycles.iter().flatten().copied().filter(move |&edge| sheet_of(edge) == sheet)
+            };
+            let mut sum = Qef::EMPTY;
+            of_sheet().map(&tangent).for_each(|(p, n)| sum += &Qef::of_plane(p, n));
+            let common = solve(cell, placement, &sum);
+            creased |= is_creased(placement, &sum);
+            if case.sheets.is_regular(sheet) {
+                let apart = if case.sheets.count > 1 { APART } else { 0.0 };
+                place(common.lerp(sum.mass_point(), apart));
+                continue;
+            }
+            // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.
+            for corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
+                let around = of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| tangent(e).0);
+                let (n, sum) = around.fold((0.0, Vec3A::ZERO), |(n, sum), p| (n + 1.0, sum + p));
+                let between = least_corner(cell) + 0.25 + 0.5 * point([0; 3], corner).as_vec3a();
+                let own = if n > 0.0 { sum / n } else { between };
+                place(own.lerp(common, 0.25));
+            }
+        }
+        creased
+    }
+}
+
+fn least_corner(cell: Local) -> Vec3A {
+    Vec3A::from(cell.coords().map(|c| c as f32))
+}
+
+/// Where the vertex of a sheet in a cell goes.
+#[inline]
+fn solve(cell: Local, placement: Placement, sum: &Qef) -> Vec3A {
+    let p = match placement {
+        Placement::SharpFeatures => sum.minimiser(),
+        Placement::MassPoint => sum.mass_point(),
+    };
+    let corner = least_corner(cell);
+    p.clamp(corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN))
+}
+
+fn is_creased(placement: Placement, sum: &Qef) -> bool {
+    placement == Placement::SharpFeatures && sum.flatness() < CREASED
 }
 
 /// Cells a side of the table: a brick and the layer before it.
@@ -431,9 +479,21 @@ const CELL_SIDE: usize = 9;
 #[derive(Debug, Clone, Copy, Default)]
 struct CellVertices {
     first: u32,
-    /// 0 for a cell with a single vertex.
-    mask: Mask,
-    sharp: bool,
+    /// The mask (0 for a cell with a single vertex), and [`CREASE`].
+    flags: u32,
+}
+
+/// The flag of a cell with a crease.
+const CREASE: u32 = 1 << 8;
+
+impl CellVertices {
+    fn mask(self) -> Mask {
+        self.flags as Mask
+    }
+
+    fn is_creased(self) -> bool {
+        self.flags & CREASE != 0
+    }
 }
 
 /// The vertices of the cells of a brick and of those before it in x, y and z. Entries of other cells are stale.
@@ -464,8 +524,8 @@ impl CellTable {
                 let c = cell.coords();
                 // 1 is the brick's own first cell; a neighbour's last cell comes to stand at 0.
                 let [x, y, z] = std::array::from_fn(|a| (c[a] as i32 + 1 + 8 * steps[a]) as usize);
-                let sharp = sharp[found].get(cell);
-                self.0[(x * CELL_SIDE + y) * CELL_SIDE + z] = CellVertices { first, mask, sharp };
+                let crease = if sharp[found].get(cell) { CREASE } else { 0 };
+                self.0[(x * CELL_SIDE + y) * CELL_SIDE + z] = CellVertices { first, flags: u32::from(mask) | crease };
             });
         }
     }
@@ -479,29 +539,29 @@ impl CellTable {
             // The four cells round the edge, counter-clockwise in (u, v), and the corner of each at the edge's start.
             let round =
                 [(su + sv, Corner::MIN | u | v), (sv, Corner::MIN | v), (0, Corner::MIN), (su, Corner::MIN | u)];
-            for edge in brick.crossed[axis.index()].iter() {
+            brick.crossed[axis.index()].iter().for_each(|edge| {
                 let [x, y, z] = edge.coords().map(|c| c as usize + 1);
                 let at = (x * CELL_SIDE + y) * CELL_SIDE + z;
                 let starts_inside = inside.get(edge);
-                let cells = round.map(|(step, _)| &self.0[at - step]);
-                let mut quad: [u32; 4] = std::array::from_fn(|i| {
-                    let CellVertices { first, mask, .. } = *cells[i];
-                    if mask == 0 {
-                        first
-                    } else {
-                        let start = round[i].1;
-                        first + slot(mask, if starts_inside { start } else { start | axis })
+                let cells = round.map(|(step, _)| self.0[at - step]);
+                let mut quad = cells.map(|cell| cell.first);
+                if cells.iter().fold(0, |a, cell| a | cell.flags) != 0 {
+                    for (vertex, (cell, (_, start))) in quad.iter_mut().zip(cells.iter().zip(round)) {
+                        if cell.mask() != 0 {
+                            *vertex += slot(cell.mask(), if starts_inside { start } else { start | axis });
+                        }
                     }
-                });
-                // The diagonal joins the vertices of a crease.
-                if cells[1].sharp && cells[3].sharp && !(cells[0].sharp && cells[2].sharp) {
-                    quad.rotate_left(1);
+                    // The diagonal joins the vertices of a crease.
+                    let creased = cells.map(CellVertices::is_creased);
+                    if creased[1] && creased[3] && !(creased[0] && creased[2]) {
+                        quad.rotate_left(1);
+                    }
                 }
                 if !starts_inside {
                     quad.swap(1, 3);
                 }
                 faces.quad(quad);
-            }
+            });
         }
     }
 }

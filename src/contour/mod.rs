@@ -7,9 +7,11 @@
 mod cells;
 mod cubes;
 mod dual;
-mod stream;
 
 pub use cubes::marching_cubes;
+/// Bricks of a piece: some five thousand cells, whose points and faces stay in the cache until they are taken.
+const PIECE: usize = 64;
+
 pub use dual::{DualOptions, Placement, dual_contouring};
 
 #[cfg(test)]
@@ -39,12 +41,12 @@ mod tests {
                 end[axis.index()] += 1;
                 if inside(at) != inside(end) {
                     state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    let sample = Sample { offset: (state >> 16) as u16, normal: state as u16 % 0xfe00 };
+                    let sample = Sample::new((state >> 16) as u16, state as u16 % 0xfe00);
                     toggles.push(Toggle { edge: finest_element(DEPTH, at, axis.into()), sample });
                 }
             }
         }
-        parity_signs(Builder::new(DEPTH, true, 0, 0).finish().toggled(toggles))
+        parity_signs(Builder::new(DEPTH, true).finish().toggled(toggles))
     }
 
     fn frame() -> Frame {

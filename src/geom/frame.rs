@@ -17,6 +17,7 @@ pub struct Frame {
     origin: DVec3,
     size: f64,
     depth: u32,
+    cell_size: f64,
 }
 
 impl Frame {
@@ -38,7 +39,7 @@ impl Frame {
             let problem = format!("a cube of {size} units at {origin} cannot be divided");
             return Err(Error::setting("box", problem, "scale the model to coordinates between 1e-280 and 1e280"));
         }
-        Ok(Frame { origin, size, depth })
+        Ok(Frame { origin, size, depth, cell_size: size / f64::from(1u32 << depth) })
     }
 
     /// The cube about the centre of `bounds` whose side is the largest extent of the model over `scale`, as PolyMender
@@ -80,7 +81,7 @@ impl Frame {
 
     /// Side of a finest cell, in model units.
     pub fn cell_size(&self) -> f64 {
-        self.size / f64::from(1u32 << self.depth)
+        self.cell_size
     }
 
     /// log2 of the number of fixed-point units in a finest cell.
@@ -97,8 +98,9 @@ impl Frame {
     }
 
     /// From a position in finest cells (0 ..= 2^depth) to model space.
+    #[inline]
     pub fn to_model(&self, cells: DVec3) -> DVec3 {
-        self.origin + cells * self.cell_size()
+        self.origin + cells * self.cell_size
     }
 }
 

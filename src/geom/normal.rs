@@ -6,7 +6,7 @@
 //! commonest normal of all in machine parts, represented exactly. The largest error is 0.6 degrees.
 
 use crate::grid::Axis;
-use glam::DVec3;
+use glam::Vec3A;
 
 /// An unoriented unit normal, relative to the axis of the edge that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -31,14 +31,15 @@ impl NormalCode {
 
     /// The unit normal; its component along `axis` is not negative.
     #[inline]
-    pub fn decode(self, axis: Axis) -> DVec3 {
-        let (s, t) = (f64::from(self.0 >> 8) - HALF, f64::from(self.0 & 255) - HALF);
+    pub fn decode(self, axis: Axis) -> Vec3A {
+        const HALF: f32 = super::normal::HALF as f32;
+        let (s, t) = (f32::from(self.0 >> 8) - HALF, f32::from(self.0 & 255) - HALF);
         let (a, b) = (0.5 * (s + t), 0.5 * (s - t));
         let c = HALF - a.abs() - b.abs();
         let n = match axis {
-            Axis::X => DVec3::new(c, a, b),
-            Axis::Y => DVec3::new(b, c, a),
-            Axis::Z => DVec3::new(a, b, c),
+            Axis::X => Vec3A::new(c, a, b),
+            Axis::Y => Vec3A::new(b, c, a),
+            Axis::Z => Vec3A::new(a, b, c),
         };
         n / n.length()
     }
@@ -47,6 +48,7 @@ impl NormalCode {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
     use proptest::prelude::*;
 
     proptest! {
@@ -55,7 +57,7 @@ mod tests {
             let axis = Axis::ALL[axis];
             let unit = DVec3::from(n).normalize();
             prop_assume!(unit[axis.index()].abs() > 1e-3);
-            let back = NormalCode::encode(axis, n).decode(axis);
+            let back = NormalCode::encode(axis, n).decode(axis).as_dvec3();
             prop_assert!(back[axis.index()] >= 0.0);
             prop_assert!(unit.dot(back).abs().min(1.0).acos().to_degrees() < 0.6, "{unit} {back}");
             prop_assert_eq!(NormalCode::encode(axis, n.map(|c| -c)), NormalCode::encode(axis, n));
@@ -65,6 +67,6 @@ mod tests {
 
     #[test]
     fn the_pole_is_exact() {
-        assert_eq!(NormalCode::encode(Axis::Y, [0.0, -3.0, 0.0]).decode(Axis::Y), DVec3::Y);
+        assert_eq!(NormalCode::encode(Axis::Y, [0.0, -3.0, 0.0]).decode(Axis::Y), Vec3A::Y);
     }
 }

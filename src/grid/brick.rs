@@ -93,6 +93,7 @@ impl Plane {
     }
 
     /// The set positions in ascending order.
+    #[inline]
     pub fn iter(&self) -> impl Iterator<Item = Local> + '_ {
         self.0.iter().zip(0u16..).flat_map(|(&word, x)| Bits(word).map(move |b| Local(x << 6 | b as u16)))
     }

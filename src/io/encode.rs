@@ -153,9 +153,12 @@ impl LineEncoder {
         LineEncoder { header, point: "", face: None, base: 0, precision }
     }
 
-    /// PLY as text, which looks like OFF behind its header.
-    pub(super) fn ply(precision: Precision) -> Self {
-        let header = |sizes, precision| super::ply::write_header("ascii", sizes, precision, true);
+    /// PLY as text, which looks like OFF behind its header. `most_corners` is the most that a face may have.
+    pub(super) fn ply(precision: Precision, most_corners: usize) -> Self {
+        let header = match most_corners {
+            0..=255 => |sizes, precision| super::ply::write_header("ascii", sizes, precision, true),
+            _ => |sizes, precision| super::ply::write_header("ascii", sizes, precision, false),
+        };
         LineEncoder { header, point: "", face: None, base: 0, precision }
     }
 }

@@ -4,7 +4,7 @@ use super::ply::{self, PlyFile};
 use super::stl::{self, StlFile};
 use super::{Encoding, Format};
 use crate::error::{Error, Result};
-use crate::mesh::{Bounds, SourceCounts, TriangleSource};
+use crate::mesh::{Bounds, Mesh, SourceCounts, TriangleSource};
 use glam::DVec3;
 use std::fs::File;
 use std::io::Read;
@@ -19,7 +19,13 @@ const PREFIX: u64 = 1 << 20;
 /// all else is held as a [`Mesh`](crate::Mesh).
 pub struct Input {
     info: InputInfo,
-    source: Box<dyn TriangleSource + Send>,
+    source: Source,
+}
+
+/// Where the triangles are.
+enum Source {
+    Memory(Mesh),
+    File(Box<dyn TriangleSource + Send>),
 }
 
 /// What is known of an input file before its triangles are read.
@@ -41,6 +47,21 @@ pub struct InputInfo {
     pub is_streamed: bool,
     /// Bytes behind the end of what the format describes, which were ignored.
     pub trailing_bytes: u64,
+}
+
+impl std::fmt::Display for InputInfo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let InputInfo { path, format, encoding, bytes, points, polygons, trailing_bytes, .. } = self;
+        write!(f, "{}: {format} ({encoding}), {bytes} bytes, ", path.display())?;
+        if let Some(points) = points {
+            write!(f, "{points} vertices, ")?;
+        }
+        write!(f, "{polygons} polygons")?;
+        if *trailing_bytes > 0 {
+            write!(f, "; {trailing_bytes} bytes behind the end were ignored")?;
+        }
+        Ok(())
+    }
 }
 
 /// Opens a file as a source of triangles.
@@ -76,7 +97,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Input> {
         is_streamed: false,
         trailing_bytes: parsed.trailing_bytes,
     };
-    Ok(Input { info, source: Box::new(parsed.mesh) })
+    Ok(Input { info, source: Source::Memory(parsed.mesh) })
 }
 
 /// Opens a file that need not be held in memory, or gives `None` when it must.
@@ -115,13 +136,35 @@ fn open_streamed(path: &Path, file: File, len: u64, prefix: &[u8]) -> Result<Opt
         },
         _ => return Ok(None),
     };
-    Ok(Some(Input { info, source }))
+    Ok(Some(Input { info, source: Source::File(source) }))
 }
 
 impl Input {
     /// What is known of the file.
     pub fn info(&self) -> &InputInfo {
         &self.info
+    }
+
+    /// The whole mesh, unless it is streamed.
+    pub fn mesh(&self) -> Option<&Mesh> {
+        match &self.source {
+            Source::Memory(mesh) => Some(mesh),
+            Source::File(_) => None,
+        }
+    }
+
+    fn source(&self) -> &dyn TriangleSource {
+        match &self.source {
+            Source::Memory(mesh) => mesh,
+            Source::File(file) => file.as_ref(),
+        }
+    }
+
+    fn source_mut(&mut self) -> &mut dyn TriangleSource {
+        match &mut self.source {
+            Source::Memory(mesh) => mesh,
+            Source::File(file) => file.as_mut(),
+        }
     }
 }
 
@@ -133,14 +176,49 @@ impl std::fmt::Debug for Input {
 
 impl TriangleSource for Input {
     fn bounds(&mut self) -> Result<Bounds> {
-        self.source.bounds()
+        self.source_mut().bounds()
     }
 
     fn triangles(&mut self, sink: &mut dyn FnMut(&[[DVec3; 3]]) -> Result<()>) -> Result<SourceCounts> {
-        self.source.triangles(sink)
+        self.source_mut().triangles(sink)
     }
 
     fn size_hint(&self) -> Option<u64> {
-        self.source.size_hint()
+        self.source().size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Opens a file of the given content.
+    fn open_bytes(name: &str, bytes: &[u8]) -> Result<(InputInfo, String)> {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        let info = open(&path)?.info().clone();
+        let shown = info.to_string().replace(&format!("{}/", directory.path().display()), "");
+        Ok((info, shown))
+    }
+
+    #[test]
+    fn what_is_known_of_a_file_can_be_shown() {
+        let (info, shown) = open_bytes("a.stl", &[[0; 84].as_slice(), b"behind"].concat()).expect("valid");
+        assert!(info.is_streamed);
+        assert_eq!(shown, "a.stl: STL (binary), 90 bytes, 0 polygons; 6 bytes behind the end were ignored");
+        let (info, shown) = open_bytes("a.obj", b"v 0 0 0\nf 1").expect("valid");
+        assert!(!info.is_streamed);
+        assert_eq!(shown, "a.obj: OBJ (text), 11 bytes, 1 vertices, 1 polygons");
+    }
+
+    #[test]
+    fn headers_longer_than_the_prefix_are_read_as_a_whole() {
+        let comments = "comment long\n".repeat(PREFIX as usize / 12);
+        let header = format!("ply\nformat binary_little_endian 1.0\n{comments}");
+        let (info, _) =
+            open_bytes("a.ply", format!("{header}element vertex 0\nend_header\n").as_bytes()).expect("valid");
+        assert_eq!((info.is_streamed, info.points), (false, Some(0)));
+        assert!(open_bytes("a.ply", header.as_bytes()).is_err());
     }
 }

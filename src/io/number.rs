@@ -16,6 +16,7 @@ const EXACT_INTEGER: u64 = 1 << 53;
 ///
 /// Clinger 1990, "How to read floating point numbers accurately", his fast case; everything else goes to the standard
 /// library, which is correctly rounded.
+#[inline]
 pub(super) fn scan(bytes: &[u8]) -> Option<(f64, usize)> {
     let negative = bytes.first() == Some(&b'-');
     let start = usize::from(matches!(bytes.first(), Some(b'-' | b'+')));
@@ -53,6 +54,7 @@ pub(super) fn scan(bytes: &[u8]) -> Option<(f64, usize)> {
 }
 
 /// The integer at the start of `bytes` (saturating at the ends of `i64`) and its length, or `None` when there is none.
+#[inline]
 pub(super) fn scan_integer(bytes: &[u8]) -> Option<(i64, usize)> {
     let negative = bytes.first() == Some(&b'-');
     let start = usize::from(matches!(bytes.first(), Some(b'-' | b'+')));
@@ -63,6 +65,7 @@ pub(super) fn scan_integer(bytes: &[u8]) -> Option<(i64, usize)> {
 }
 
 /// Appends the digits from `at` on to `value` (wrapping) and returns where they end.
+#[inline]
 fn digits(bytes: &[u8], mut at: usize, value: &mut u64) -> usize {
     while let Some(digit) = bytes.get(at).map(|b| b.wrapping_sub(b'0')).filter(|d| *d < 10) {
         *value = value.wrapping_mul(10).wrapping_add(u64::from(digit));

@@ -118,7 +118,8 @@ impl<'a> Text<'a> {
     }
 
     /// Takes what `scan` finds under the cursor.
-    fn take<T>(&mut self, scan: fn(&[u8]) -> Option<(T, usize)>, what: impl Display) -> Result<T> {
+    #[inline]
+    fn take<T>(&mut self, scan: impl Fn(&[u8]) -> Option<(T, usize)>, what: impl Display) -> Result<T> {
         let rest = self.rest();
         match scan(rest) {
             Some((value, length)) if rest.get(length).is_none_or(|&b| is_delimiter(b)) => {

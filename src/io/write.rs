@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
 /// Bytes gathered before they are written.
-const CHUNK: usize = 1 << 20;
+const CHUNK: usize = 1 << 18;
 /// Points or corners encoded at once, so that the buffer does not grow far beyond [`CHUNK`].
 const PIECE: usize = 1 << 14;
 
@@ -22,7 +22,7 @@ pub struct WriteOptions {
     pub precision: Precision,
     /// Text instead of binary, where a format has both.
     pub is_text: bool,
-    /// The most corners that a face may have. Above 255, each face of a binary PLY file takes 3 bytes more.
+    /// The most corners that a face of a PLY file may have. Above 255, each face takes 3 bytes more.
     pub most_corners: usize,
 }
 
@@ -57,7 +57,7 @@ pub fn create(path: impl AsRef<Path>, format: Format, options: WriteOptions) -> 
     let name = path.display().to_string();
     let encoder: Box<dyn Encoder + Send> = match (format, is_text, precision) {
         (Format::Ply, false, _) => Box::new(PlyEncoder::new(precision, most_corners)),
-        (Format::Ply, true, _) => Box::new(LineEncoder::ply(precision)),
+        (Format::Ply, true, _) => Box::new(LineEncoder::ply(precision, most_corners)),
         (Format::Stl, false, _) => Box::new(StlEncoder::binary(name)),
         (Format::Stl, true, Precision::Single) => Box::new(StlEncoder::<Vec3>::text(name, precision)),
         (Format::Stl, true, Precision::Double) => Box::new(StlEncoder::<DVec3>::text(name, precision)),
@@ -70,7 +70,7 @@ pub fn create(path: impl AsRef<Path>, format: Format, options: WriteOptions) -> 
         encoder,
         out: Out::default(),
         // Only where one byte counts the corners is there a limit.
-        most_corners: if format == Format::Ply && !is_text && most_corners <= 255 { 255 } else { usize::MAX },
+        most_corners: if format == Format::Ply && most_corners <= 255 { 255 } else { usize::MAX },
         bytes: 0,
         promised: MeshSizes::default(),
         received: MeshSizes::default(),

@@ -7,6 +7,7 @@ mod sets;
 mod source;
 mod star;
 mod stream;
+mod tally;
 mod validate;
 
 pub use polygon::triangulate;

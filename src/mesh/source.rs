@@ -5,7 +5,7 @@ use crate::error::{Error, Place, Result};
 use glam::DVec3;
 
 /// Triangles passed on at once.
-const BATCH: usize = 1 << 14;
+const BATCH: usize = 1 << 12;
 
 /// Cuts polygons into triangles and passes these on in batches.
 pub(crate) struct Batch<'a> {
@@ -165,7 +165,11 @@ mod tests {
         let mut mesh = mixed();
         (0..2 * BATCH).for_each(|_| mesh.faces.push(&[0, 1, 2]));
         let mut sizes = Vec::new();
-        let counts = mesh.triangles(&mut |batch| Ok(sizes.push(batch.len()))).expect("valid");
+        let mut sink = |batch: &[[DVec3; 3]]| {
+            sizes.push(batch.len());
+            Ok(())
+        };
+        let counts = mesh.triangles(&mut sink).expect("valid");
         assert_eq!(sizes, [BATCH, BATCH, 3]);
         assert_eq!(counts.triangles, 2 * BATCH as u64 + 3);
     }

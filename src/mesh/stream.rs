@@ -19,7 +19,7 @@ impl Bounds {
 
     /// Whether no point has been added.
     pub fn is_empty(&self) -> bool {
-        !(self.min.x <= self.max.x)
+        self.min.x > self.max.x
     }
 
     /// Grows the box to hold `p`; points with a coordinate that is not finite are left out.

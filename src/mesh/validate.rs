@@ -1,7 +1,7 @@
 //! Is this the surface of a solid? If not, why?
 
-use super::report::{CHUNK, sum_faces};
 use super::star::{Star, Stars, repeated};
+use super::tally::{CHUNK, sum_faces};
 use super::{Bounds, Mesh};
 use rayon::prelude::*;
 use std::fmt;

@@ -14,14 +14,16 @@
 //!
 //! # Cost
 //!
-//! 208 bytes a brick, some 30 for its index entry, 2 bytes a crossing for the offset and 2 more if there are normals. A
-//! surface crosses about 80 edges of a brick: 5 bytes a crossing without normals, 7 with.
+//! 232 bytes a brick, some 30 for its index entry, 2 bytes a crossing for the offset and 2 more if there are normals. A
+//! surface crosses about 75 edges of a brick: 5.5 bytes a crossing without normals, 7.5 with.
 
 use super::LinearOctree;
+use super::segments::Segments;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::key::SIDE;
 use crate::grid::{Axis, Direction, Extent, Key};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The crossed edges of one brick.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,10 +34,19 @@ pub struct Brick {
     pub crossed: [Plane; 3],
     /// Number of crossings in all bricks before this one.
     pub first: u32,
+    /// Places of the bricks at +x, +y, +z, +x+y, +x+z, +y+z, or [`NO_BRICK`]. Keys would tell as well; every stage asks, and six hash
+    /// probes a brick and stage took a tenth of the whole repair.
+    plus: [u32; 6],
 }
 
+/// Stands for a brick that is not there.
+const NO_BRICK: u32 = u32::MAX;
+
+/// The directions of [`Brick::plus`].
+const PLUS: [[i32; 3]; 6] = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1]];
+
 /// A brick that nothing crosses, standing in for all that are not there.
-static NOTHING: Brick = Brick { key: Key::ROOT, crossed: [Plane::EMPTY; 3], first: 0 };
+static NOTHING: Brick = Brick { key: Key::ROOT, crossed: [Plane::EMPTY; 3], first: 0, plus: [NO_BRICK; 6] };
 
 impl Brick {
     /// Number of crossings on its edges.
@@ -64,6 +75,12 @@ pub struct Sample {
 pub const OFFSET_MARGIN: u16 = 64;
 
 impl Sample {
+    /// A sample so far from the start of its edge, in 65536ths, but not nearer to its ends than [`OFFSET_MARGIN`].
+    #[inline]
+    pub fn new(offset: u16, normal: u16) -> Self {
+        Sample { offset: offset.clamp(OFFSET_MARGIN, u16::MAX - OFFSET_MARGIN), normal }
+    }
+
     /// The position along the edge, in cells: above 0, below 1.
     pub fn position(self) -> f64 {
         position(self.offset)
@@ -85,15 +102,20 @@ pub struct Toggle {
     pub sample: Sample,
 }
 
+/// A list of bricks.
+pub type Bricks = Segments<Brick, 8>;
+/// A list of small numbers.
+pub type Codes = Segments<u16, 15>;
+
 /// All crossed edges of a finest grid with 2^depth cells a side.
 #[derive(Debug, Clone)]
 pub struct Crossings {
     depth: u32,
     index: LinearOctree<u32>,
-    bricks: Vec<Brick>,
-    offsets: Vec<u16>,
+    bricks: Bricks,
+    offsets: Codes,
     /// As many as offsets, or none at all.
-    normals: Vec<u16>,
+    normals: Codes,
     with_normals: bool,
 }
 
@@ -124,7 +146,7 @@ impl Crossings {
     }
 
     /// All bricks, sorted by key.
-    pub fn bricks(&self) -> &[Brick] {
+    pub fn bricks(&self) -> &Bricks {
         &self.bricks
     }
 
@@ -139,19 +161,26 @@ impl Crossings {
     }
 
     /// Offsets of all crossings, in 65536ths of a cell, in the order of the bricks.
-    pub fn offsets(&self) -> &[u16] {
+    pub fn offsets(&self) -> &Codes {
         &self.offsets
     }
 
     /// Codes of the normals of all crossings; empty where normals are not kept.
-    pub fn normals(&self) -> &[u16] {
+    pub fn normals(&self) -> &Codes {
         &self.normals
+    }
+
+    /// The places in the arrays of the crossings of some bricks.
+    pub fn places(&self, bricks: Range<usize>) -> Range<usize> {
+        let first = |i| if i < self.bricks.len() { self.bricks[i].first as usize } else { self.len() };
+        first(bricks.start)..first(bricks.end)
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.bricks.capacity() * size_of::<Brick>()
-            + 2 * (self.offsets.capacity() + self.normals.capacity())
+        self.bricks.allocated_bytes()
+            + self.offsets.allocated_bytes()
+            + self.normals.allocated_bytes()
             + self.index.allocated_bytes()
     }
 
@@ -165,9 +194,10 @@ impl Crossings {
         brick.and_then(|key| self.find(key)).map_or(&NOTHING, |i| &self.bricks[i])
     }
 
-    /// The brick one further from brick `i` in the given direction, or one without crossings.
-    pub fn beside(&self, brick: &Brick, direction: Direction) -> &Brick {
-        self.brick_or_nothing(brick.key.toward(direction))
+    /// The bricks at +x, +y, +z, +x+y, +x+z, +y+z of a brick; where there is none, one without crossings.
+    #[inline]
+    pub fn plus(&self, brick: &Brick) -> [&Brick; 6] {
+        brick.plus.map(|place| if place == NO_BRICK { &NOTHING } else { &self.bricks[place as usize] })
     }
 
     /// The lattice point at which a brick starts, in cells.
@@ -196,20 +226,21 @@ impl Crossings {
 
     /// The sample at a place of the arrays.
     fn sample_at(&self, place: usize) -> Sample {
-        Sample { offset: self.offsets[place], normal: self.normals.get(place).copied().unwrap_or(0) }
+        Sample { offset: self.offsets[place], normal: if self.with_normals { self.normals[place] } else { 0 } }
     }
 
     /// The finest faces of which an odd number of edges is crossed, sorted: the boundary of the dual surface (Ju 2004). None
     /// means that signs can be given to the lattice points. Cost: some 150 ns a brick, in parallel.
     pub fn odd_faces(&self) -> Vec<Key> {
-        let mut odd: Vec<Key> = self.bricks.par_iter().flat_map_iter(|brick| self.odd_faces_of(brick)).collect();
+        let bricks = (0..self.bricks.len()).into_par_iter();
+        let mut odd: Vec<Key> = bricks.flat_map_iter(|i| self.odd_faces_of(&self.bricks[i])).collect();
         odd.par_sort_unstable();
         odd
     }
 
     fn odd_faces_of(&self, brick: &Brick) -> Vec<Key> {
         let [x, y, z] = &brick.crossed;
-        let [nx, ny, nz] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|steps| &self.beside(brick, toward(steps)).crossed);
+        let [nx, ny, nz, ..] = self.plus(brick).map(|b| &b.crossed);
         let across = [
             *y ^ y.at_plus_z(&nz[1]) ^ *z ^ z.at_plus_y(&ny[2]),
             *x ^ x.at_plus_z(&nz[0]) ^ *z ^ z.at_plus_x(&nx[2]),
@@ -245,10 +276,9 @@ impl Crossings {
             }
         }
         // Edge keys are sorted by their centres: those of a brick come together, and bricks come in order.
-        let mut builder =
-            Builder::new(self.depth, self.with_normals, self.bricks.len() + by_brick.len(), self.len() + toggles.len());
+        let mut builder = Builder::new(self.depth, self.with_normals);
         let mut pending = by_brick.into_iter().peekable();
-        for brick in &self.bricks {
+        for brick in self.bricks.iter() {
             while let Some((key, list)) = pending.next_if(|(key, _)| *key < brick.key) {
                 builder.push_toggled(&self, &Brick { key, ..NOTHING.clone() }, &list);
             }
@@ -283,6 +313,12 @@ impl Crossings {
                 return Err(format!("brick {} starts at {}, not {first}", brick.key, brick.first));
             }
             first += brick.count();
+            for (steps, place) in PLUS.into_iter().zip(brick.plus) {
+                let there = brick.key.toward(toward(steps)).and_then(|key| self.find(key));
+                if there != (place != NO_BRICK).then_some(place as usize) {
+                    return Err(format!("brick {} has a wrong neighbour at {steps:?}", brick.key));
+                }
+            }
             for apron in apron(brick) {
                 if brick.key.toward(apron).and_then(|key| self.find(key)).is_none() {
                     return Err(format!(
@@ -328,28 +364,28 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// Starts with room for so many bricks and edges.
-    pub fn new(depth: u32, with_normals: bool, bricks: usize, edges: usize) -> Self {
-        let made = Crossings {
-            depth,
-            index: LinearOctree::with_capacity(bricks),
-            bricks: Vec::with_capacity(bricks),
-            offsets: Vec::with_capacity(edges),
-            normals: Vec::with_capacity(if with_normals { edges } else { 0 }),
-            with_normals,
-        };
-        Builder { made }
+    /// Starts without bricks.
+    pub fn new(depth: u32, with_normals: bool) -> Self {
+        let (bricks, offsets, normals) = Default::default();
+        Builder { made: Crossings { depth, index: LinearOctree::new(), bricks, offsets, normals, with_normals } }
     }
 
-    /// Appends a brick with one offset (and normal, if they are kept) for each set bit.
+    /// Appends a brick with one offset (and normal, if they are kept) for each set bit. Bricks without any are left out.
     ///
     /// # Panics
     /// When the numbers do not agree, or beyond 2^32 crossings.
     pub fn push(&mut self, key: Key, crossed: [Plane; 3], offsets: &[u16], normals: &[u16]) {
         let first = u32::try_from(self.made.len()).expect("fewer than 2^32 crossings");
-        let brick = Brick { key, crossed, first };
+        let brick = Brick { key, crossed, first, plus: [NO_BRICK; 6] };
         assert_eq!(brick.count() as usize, offsets.len(), "one offset a crossing");
-        self.made.offsets.extend(offsets.iter().map(|o| o.clamp(&OFFSET_MARGIN, &(u16::MAX - OFFSET_MARGIN))));
+        if offsets.is_empty() {
+            return;
+        }
+        debug_assert!(
+            offsets.iter().all(|o| (OFFSET_MARGIN..=u16::MAX - OFFSET_MARGIN).contains(o)),
+            "see Sample::new"
+        );
+        self.made.offsets.extend_from_slice(offsets);
         if self.made.with_normals {
             assert_eq!(normals.len(), offsets.len(), "one normal a crossing");
             self.made.normals.extend_from_slice(normals);
@@ -359,8 +395,9 @@ impl Builder {
 
     fn push_copy(&mut self, from: &Crossings, brick: &Brick) {
         let range = brick.first as usize..(brick.first + brick.count()) as usize;
-        let normals = if from.with_normals { &from.normals[range.clone()] } else { &[] };
-        self.push(brick.key, brick.crossed, &from.offsets[range], normals);
+        let offsets: Vec<u16> = from.offsets.range(range.clone()).copied().collect();
+        let normals: Vec<u16> = from.normals.range(range).copied().collect();
+        self.push(brick.key, brick.crossed, &offsets, &normals);
     }
 
     fn push_toggled(&mut self, from: &Crossings, brick: &Brick, toggles: &[Toggle]) {
@@ -389,46 +426,61 @@ impl Builder {
         self.push(brick.key, crossed, &offsets, &normals);
     }
 
-    /// Adds the bricks without crossings that the invariant asks for, and the index.
+    /// Adds the bricks without crossings that the invariant asks for, the index and the neighbours.
     pub fn finish(self) -> Crossings {
         let mut made = self.made;
-        made.bricks.retain(|b| b.crossed.iter().any(|p| !p.is_empty()));
-        for (i, brick) in made.bricks.iter().enumerate() {
-            made.index.insert(brick.key, i as u32);
+        made.index.reserve(made.bricks.len() + made.bricks.len() / 4);
+        for (place, brick) in (0..).zip(made.bricks.iter()) {
+            made.index.insert(brick.key, place);
         }
-        let mut missing: Vec<Key> = made
-            .bricks
-            .par_iter()
-            .flat_map_iter(|brick| {
+        let bricks = (0..made.bricks.len()).into_par_iter();
+        let mut missing: Vec<Key> = bricks
+            .flat_map_iter(|i| {
+                let brick = &made.bricks[i];
                 let needed =
                     apron(brick).map(|d| brick.key.toward(d).expect("crossed edges lie off the root's boundary"));
                 needed.filter(|key| made.index.get(*key).is_none()).collect::<Vec<_>>()
             })
             .collect();
-        if missing.is_empty() {
-            return made;
-        }
         missing.par_sort_unstable();
         missing.dedup();
-        // Merge in place, from the back.
-        let (mut old, end) = (made.bricks.len(), made.offsets.len() as u32);
-        made.bricks.reserve_exact(missing.len());
-        made.bricks.resize(old + missing.len(), NOTHING.clone());
-        let mut following = end;
-        for place in (0..made.bricks.len()).rev() {
-            if missing.last().is_some_and(|key| old == 0 || made.bricks[old - 1].key < *key) {
-                let key = missing.pop().expect("just looked at");
-                made.bricks[place] = Brick { key, first: following, ..NOTHING.clone() };
-            } else {
-                old -= 1;
-                made.bricks.swap(old, place);
-                following = made.bricks[place].first;
-            }
-            made.index.insert(made.bricks[place].key, place as u32);
-            if missing.is_empty() && old == place {
+        made.insert_empty(missing);
+        let bricks = (0..made.bricks.len()).into_par_iter();
+        let plus: Vec<[u32; 6]> = bricks
+            .map(|i| {
+                let key = made.bricks[i].key;
+                let place = |steps| key.toward(toward(steps)).and_then(|key| made.index.get(key).copied());
+                PLUS.map(|steps| place(steps).unwrap_or(NO_BRICK))
+            })
+            .collect();
+        plus.into_iter().enumerate().for_each(|(i, plus)| made.bricks[i].plus = plus);
+        made
+    }
+}
+
+impl Crossings {
+    /// Merges sorted bricks without crossings into the list, in place and from the back.
+    fn insert_empty(&mut self, mut missing: Vec<Key>) {
+        let mut old = self.bricks.len();
+        (0..missing.len()).for_each(|_| self.bricks.push(NOTHING.clone()));
+        let mut following = self.offsets.len() as u32;
+        for place in (0..self.bricks.len()).rev() {
+            if missing.is_empty() {
                 break;
             }
+            let brick = match missing.last() {
+                Some(&key) if old == 0 || self.bricks[old - 1].key < key => {
+                    missing.pop();
+                    Brick { key, first: following, ..NOTHING.clone() }
+                }
+                _ => {
+                    old -= 1;
+                    self.bricks[old].clone()
+                }
+            };
+            following = brick.first;
+            self.index.insert(brick.key, place as u32);
+            self.bricks[place] = brick;
         }
-        made
     }
 }

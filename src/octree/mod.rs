@@ -25,6 +25,7 @@ mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub mod segments;
 pub mod signed;
 mod traverse;
 mod validate;

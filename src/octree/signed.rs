@@ -1,8 +1,9 @@
 //! Inside and outside at every lattice point: what repair, topology and contouring meet in.
 
-use super::crossings::{Brick, Crossings, finest_element, position};
+use super::crossings::{Crossings, finest_element, position};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
+use crate::parallel::pieces;
 use rayon::prelude::*;
 
 /// Crossed edges together with the signs of the lattice points.
@@ -57,16 +58,17 @@ impl SignedOctree {
     /// Volume enclosed, in cells: the length of all x-lines of the grid that is inside. Cost: some 2 ns a crossed x-edge.
     pub fn volume(&self) -> f64 {
         // Sums of fixed chunks in a fixed order: the same for any number of threads.
-        let bricks = self.crossings.bricks().par_chunks(256).zip(self.inside.par_chunks(256));
-        let sums: Vec<f64> =
-            bricks.map(|(bricks, inside)| bricks.iter().zip(inside).map(|b| self.volume_of(b.0, b.1)).sum()).collect();
+        let (count, piece) = pieces(self.inside.len(), 256);
+        let sums: Vec<f64> = (0..count).into_par_iter().map(|n| piece(n).map(|i| self.volume_of(i)).sum()).collect();
         sums.iter().sum()
     }
 
     /// Where lines leave the inside counts positive, where they enter it, negative.
-    fn volume_of(&self, brick: &Brick, inside: &Plane) -> f64 {
+    fn volume_of(&self, i: usize) -> f64 {
+        let (brick, inside) = (&self.crossings.bricks()[i], &self.inside[i]);
         let from = f64::from(self.crossings.origin(brick)[0]);
-        let offsets = &self.crossings.offsets()[brick.first as usize..];
+        let first = brick.first as usize;
+        let offsets = self.crossings.offsets().range(first..first + brick.crossed[0].count() as usize);
         let ends = brick.crossed[0].iter().zip(offsets).map(|(p, &offset)| {
             let x = from + f64::from(p.coords()[0]) + position(offset);
             if inside.get(p) { x } else { -x }

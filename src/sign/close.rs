@@ -268,7 +268,7 @@ impl Patch<'_> {
             *w = if least > 0.0 { least.copysign(*w) } else { 1.0 };
         }
         let normal = NormalCode::encode(axis, normal.to_array());
-        let sample = Sample { offset: (position * 65536.0) as u16, normal: normal.0 };
+        let sample = Sample::new((position * 65536.0) as u16, normal.0);
         self.toggles.push(Toggle { edge, sample });
     }
 }
@@ -386,12 +386,12 @@ mod tests {
     }
 
     fn edges(depth: u32, list: &[([u32; 3], usize)]) -> Crossings {
-        let sample = Sample { offset: 1 << 15, normal: 0 };
+        let sample = Sample::new(1 << 15, 0);
         let toggle = |&(at, axis): &([u32; 3], usize)| Toggle {
             edge: finest_element(depth, at, Extent::from(Axis::ALL[axis])),
             sample,
         };
-        Builder::new(depth, true, 0, 0).finish().toggled(list.iter().map(toggle).collect())
+        Builder::new(depth, true).finish().toggled(list.iter().map(toggle).collect())
     }
 
     proptest! {

@@ -183,6 +183,7 @@ impl Hits for HitSorter {
 }
 
 /// Sorts hits by edge, then by offset and normal.
+#[inline(never)]
 pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) {
     const DIGIT: u32 = 10;
     if hits.len() < 512 {
@@ -190,27 +191,33 @@ pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) {
         return;
     }
     // Two stable passes over the 20 bits of the slot; hits that share an edge are few and sorted afterwards.
-    scratch.clear();
     scratch.resize(hits.len(), Hit(0));
-    for shift in [32, 32 + DIGIT] {
-        let digit = |h: Hit| (h.0 >> shift) as usize & ((1 << DIGIT) - 1);
-        let mut next = [0u32; 1 << DIGIT];
-        hits.iter().for_each(|&h| next[digit(h)] += 1);
+    let digit = |h: Hit, shift: u32| (h.0 >> shift) as usize & ((1 << DIGIT) - 1);
+    let mut next = [[0u32; 1 << DIGIT]; 2];
+    for &h in hits.iter() {
+        next[0][digit(h, 32)] += 1;
+        next[1][digit(h, 32 + DIGIT)] += 1;
+    }
+    for (shift, next) in [32, 32 + DIGIT].into_iter().zip(&mut next) {
         let mut sum = 0;
-        for n in &mut next {
+        for n in next.iter_mut() {
             sum += std::mem::replace(n, sum);
         }
         for &h in hits.iter() {
-            let place = &mut next[digit(h)];
+            let place = &mut next[digit(h, shift)];
             scratch[*place as usize] = h;
             *place += 1;
         }
         std::mem::swap(hits, scratch);
     }
-    for edge in hits.chunk_by_mut(|a, b| a.slot() == b.slot()) {
-        if edge.len() > 1 {
-            edge.sort_unstable();
+    let mut i = 1;
+    while i < hits.len() {
+        if hits[i - 1].slot() == hits[i].slot() {
+            let end = i + hits[i..].iter().take_while(|h| h.slot() == hits[i].slot()).count();
+            hits[i - 1..end].sort_unstable();
+            i = end;
         }
+        i += 1;
     }
 }
 
@@ -230,7 +237,7 @@ mod tests {
         bucket.drain_into(&mut hits);
         assert_eq!(brick_coords(hits[0].brick()), [5, 2, 7]);
         assert_eq!((hits[0].local(), hits[0].axis(), hits[0].offset()), (64 * 3 + 8 * 7 + 1, 1, 999));
-        assert_eq!(hits[0].normal().decode(Axis::Y), glam::DVec3::Y);
+        assert_eq!(hits[0].normal().decode(Axis::Y), glam::Vec3A::Y);
     }
 
     #[test]

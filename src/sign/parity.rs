@@ -19,11 +19,10 @@ pub fn parity_signs(crossings: Crossings) -> SignedOctree {
     debug_assert!(crossings.odd_faces().is_empty(), "closed before signs are counted");
     let bricks = crossings.bricks();
     // Bricks by row: y and z, then x, all in bricks.
-    let mut rows: Vec<(u64, u32)> = bricks
-        .par_iter()
-        .enumerate()
-        .map(|(i, brick)| {
-            let [x, y, z] = crossings.origin(brick).map(|c| u64::from(c >> 3));
+    let mut rows: Vec<(u64, u32)> = (0..bricks.len())
+        .into_par_iter()
+        .map(|i| {
+            let [x, y, z] = crossings.origin(&bricks[i]).map(|c| u64::from(c >> 3));
             ((y << 16 | z) << 16 | x, i as u32)
         })
         .collect();

@@ -17,9 +17,10 @@ use crate::error::Result;
 use crate::geom::Frame;
 use crate::geom::raster::{FineTriangle, rasterise};
 use crate::grid::brick::{Local, Plane};
-use crate::grid::{Axis, Extent, Key};
+use crate::grid::{Axis, Key};
 use crate::mesh::{SourceCounts, TriangleSource};
 use crate::octree::crossings::{Builder, Crossings, Sample, Toggle, finest_element};
+use crate::parallel::in_order;
 use crate::progress::{Progress, Stage, check};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -84,7 +85,7 @@ pub fn scan(
 }
 
 /// Rasterises a triangle in model coordinates; `false` if it cannot be placed in the grid.
-#[inline]
+#[inline(never)]
 fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter) -> bool {
     let [Some(a), Some(b), Some(c)] = triangle.map(|p| frame.snap(p)) else {
         return false;
@@ -119,36 +120,26 @@ struct Resolved {
     hits: u64,
 }
 
-/// Blocks that are resolved between two questions whether to go on.
-const BLOCKS_AT_ONCE: usize = 256;
-
 fn resolve(
-    mut blocks: Vec<(BlockCoords, Vec<Bucket>)>,
+    blocks: Vec<(BlockCoords, Vec<Bucket>)>,
     depth: u32,
     with_normals: bool,
     counts: &mut ScanCounts,
     progress: &dyn Progress,
 ) -> Result<Crossings> {
-    let mut resolved: Vec<Resolved> = Vec::with_capacity(blocks.len());
-    while !blocks.is_empty() {
-        check(progress)?;
-        let rest = blocks.split_off(blocks.len().min(BLOCKS_AT_ONCE));
-        let scratch = || (Vec::new(), Vec::new());
-        resolved.par_extend(std::mem::replace(&mut blocks, rest).into_par_iter().map_init(
-            scratch,
-            |(hits, spare), (block, buckets)| {
-                hits.clear();
-                buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
-                sort_hits(hits, spare);
-                resolve_block(block, hits, depth, with_normals)
-            },
-        ));
-    }
-    let bricks = resolved.iter().map(|r| r.bricks.len()).sum();
-    let edges = resolved.iter().map(|r| r.offsets.len()).sum();
-    let mut builder = Builder::new(depth, with_normals, bricks, edges);
+    // Each block's hits are given back when it is resolved.
+    let blocks: Vec<Mutex<_>> = blocks.into_iter().map(|block| Mutex::new(Some(block))).collect();
+    let resolve = |(hits, spare): &mut (Vec<Hit>, Vec<Hit>), n: usize| {
+        let block = blocks[n].lock().expect("locked once").take();
+        let (block, buckets) = block.expect("each block is resolved once");
+        hits.clear();
+        buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
+        sort_hits(hits, spare);
+        resolve_block(block, hits, depth, with_normals)
+    };
+    let mut builder = Builder::new(depth, with_normals);
     let mut merges = Vec::new();
-    for block in resolved {
+    let append = |block: Resolved| {
         let mut from = 0;
         for &(key, crossed) in &block.bricks {
             let to = from + crossed.iter().map(Plane::count).sum::<u32>() as usize;
@@ -158,7 +149,9 @@ fn resolve(
         }
         merges.extend(block.merges);
         counts.hits += block.hits;
-    }
+        Ok(())
+    };
+    in_order(blocks.len(), progress, Default::default, resolve, append)?;
     let crossings = builder.finish();
     let merges = walls::worth_merging(&crossings, merges);
     counts.merged_walls = merges.len() as u64;
@@ -168,6 +161,7 @@ fn resolve(
 /// Hits as close as this on one edge are one wall, in 65536ths of a cell: room for two roundings.
 const COINCIDENT: u16 = 2;
 
+#[inline(never)]
 fn resolve_block(block: BlockCoords, hits: &[Hit], depth: u32, with_normals: bool) -> Resolved {
     let mut out = Resolved { hits: hits.len() as u64, ..Resolved::default() };
     out.offsets.reserve_exact(hits.len());
@@ -180,29 +174,30 @@ fn resolve_block(block: BlockCoords, hits: &[Hit], depth: u32, with_normals: boo
         let mut i = 0;
         while i < of_brick.len() {
             let slot = of_brick[i].slot();
-            let n = 1 + of_brick[i + 1..].iter().take_while(|h| h.slot() == slot).count();
-            let edge = &of_brick[i..i + n];
-            i += n;
+            let mut n = 1;
+            while i + n < of_brick.len() && of_brick[i + n].slot() == slot {
+                n += 1;
+            }
             // The middle one: for an odd number of walls the surface that is left when pairs cancel from both ends.
-            let sample = edge[(n - 1) / 2];
+            let middle = of_brick[i + (n - 1) / 2];
+            let sample = Sample::new(middle.offset(), middle.normal().0);
             if n % 2 == 1 {
-                crossed[sample.axis()].set(Local::from_index(sample.local()));
-                out.offsets.push(sample.offset());
+                crossed[middle.axis()].set(Local::from_index(middle.local()));
+                out.offsets.push(sample.offset);
                 if with_normals {
-                    out.normals.push(sample.normal().0);
+                    out.normals.push(sample.normal);
                 }
             }
             if n > 1 {
-                let walls = edge.chunk_by(|a, b| b.offset() - a.offset() <= COINCIDENT).count();
+                let walls = of_brick[i..i + n].chunk_by(|a, b| b.offset() - a.offset() <= COINCIDENT).count();
                 if walls % 2 != n % 2 {
-                    let axis = Axis::ALL[sample.axis()];
-                    let local = Local::from_index(sample.local()).coords();
+                    let local = Local::from_index(middle.local()).coords();
                     let point = std::array::from_fn(|a| (block[a] * 8 + at[a]) * 8 + local[a]);
-                    let edge = finest_element(depth, point, Extent::from(axis));
-                    let sample = Sample { offset: sample.offset(), normal: sample.normal().0 };
+                    let edge = finest_element(depth, point, Axis::ALL[middle.axis()].into());
                     out.merges.push(Toggle { edge, sample });
                 }
             }
+            i += n;
         }
         out.bricks.push((key, crossed));
     }

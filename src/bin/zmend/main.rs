@@ -1,22 +1,44 @@
-//! The program.
-use zmend::*;
-fn main() -> Result<()> {
-    let a: Vec<String> = std::env::args().collect();
-    let mut input = zmend::io::open(&a[1])?;
-    let surface = match a[4].as_str() {
-        "mc" => Surface::MarchingCubes,
-        "dc" => Surface::DualContouring,
-        _ => Surface::Quads,
-    };
-    let mut out = zmend::io::create(&a[2], zmend::io::Format::from_path(&a[2]).unwrap(), Default::default())?;
-    let r = repair_into(
-        &mut input,
-        &Options { depth: a[3].parse().unwrap(), surface, ..Options::default() },
-        &mut out,
-        &zmend::progress::Silent,
-    )?;
-    let t = std::time::Instant::now();
-    out.finish()?;
-    println!("{r:#?} {:?}", t.elapsed());
-    Ok(())
+//! The program `zmend`: arguments in, library calls, tables out. No algorithm lives here.
+
+mod args;
+mod bars;
+mod digits;
+mod goal;
+mod info;
+mod json;
+mod measure;
+mod print;
+mod render;
+mod repair;
+mod sample;
+mod summary;
+mod units;
+
+use args::{Args, Command};
+use clap::Parser;
+use std::process::ExitCode;
+use zmend::{Error, Result};
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(code) => code,
+        Err(error) => {
+            print::error(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<ExitCode> {
+    if let Some(threads) = args.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads));
+        pool.build_global().map_err(|e| Error::setting("threads", e.to_string(), "take fewer"))?;
+    }
+    match &args.command {
+        Command::Repair(args) => repair::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Sample(args) => sample::run(args),
+        Command::Render(args) => render::run(args),
+    }
 }

@@ -8,6 +8,9 @@ use glam::DVec3;
 use std::io::Read;
 use std::marker::PhantomData;
 
+/// Stands in a strip between two strips.
+const RESTART: f64 = -1.0;
+
 const CUT_SHORT: &str = "the file is cut short or its header wrong: copy or export it again";
 
 /// A source of values in the order of the file. All types are passed as `f64`, which holds every index exactly.
@@ -159,7 +162,7 @@ pub(super) trait Body {
     /// two equal vertices and are left out.
     fn strips(&mut self, element: &Element, points: u64, mut visit: impl FnMut([u32; 3]) -> Result<()>) -> Result<()> {
         self.lists(element, |body, record, list| {
-            for strip in list.split(|&index| index == -1.0) {
+            for strip in list.split(|index| index.to_bits() == RESTART.to_bits()) {
                 for (i, window) in strip.windows(3).enumerate() {
                     let mut corner = |k: usize| body.index(element, record, window[k], points);
                     let (a, b, c) = (corner(0)?, corner(1)?, corner(2)?);

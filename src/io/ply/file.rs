@@ -39,6 +39,25 @@ enum Positions {
 }
 
 impl Positions {
+    /// No positions, but room for those of an element that is known to fit in the file.
+    fn with_room_for(element: &Element) -> Self {
+        let room = element.count as usize;
+        let is_coordinate = |name: &str| matches!(name, "x" | "y" | "z");
+        let is_single = |kind: Kind| matches!(kind, Kind::One(Scalar::F32));
+        if element.properties.iter().all(|p| !is_coordinate(&p.name) || is_single(p.kind)) {
+            Positions::Single(Vec::with_capacity(room))
+        } else {
+            Positions::Double(Vec::with_capacity(room))
+        }
+    }
+
+    fn push(&mut self, point: DVec3) {
+        match self {
+            Positions::Single(points) => points.push(point.as_vec3()),
+            Positions::Double(points) => points.push(point),
+        }
+    }
+
     #[inline]
     fn get(&self, index: u32) -> DVec3 {
         match self {
@@ -93,20 +112,11 @@ impl PlyFile {
             body.check_size(element)?;
             match element.name.as_str() {
                 "vertex" => {
-                    let is_coordinate = |name: &str| matches!(name, "x" | "y" | "z");
-                    let is_single = element
-                        .properties
-                        .iter()
-                        .all(|p| !is_coordinate(&p.name) || matches!(p.kind, Kind::One(Scalar::F32)));
-                    if is_single {
-                        let mut points = Vec::with_capacity(element.count as usize);
-                        body.points(element, |point| Ok(points.push(point.as_vec3())))?;
-                        found = Positions::Single(points);
-                    } else {
-                        let mut points = Vec::with_capacity(element.count as usize);
-                        body.points(element, |point| Ok(points.push(point)))?;
-                        found = Positions::Double(points);
-                    }
+                    found = Positions::with_room_for(element);
+                    body.points(element, |point| {
+                        found.push(point);
+                        Ok(())
+                    })?;
                 }
                 "face" => {
                     faces = Some(Faces { element: element.clone(), start: body.position() });
@@ -137,7 +147,9 @@ impl TriangleSource for PlyFile {
         }
         let mut bounds = Bounds::EMPTY;
         self.visit_faces(|face| {
-            face.iter().for_each(|&corner| bounds.add(self.points.get(corner)));
+            for &corner in face {
+                bounds.add(self.points.get(corner));
+            }
             Ok(())
         })?;
         self.bounds = Some(bounds);

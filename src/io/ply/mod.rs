@@ -62,8 +62,9 @@ fn read_elements(header: &Header, body: &mut impl Body, builder: &mut Builder<'_
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fmt::Write;
 
-    /// A square as two vertices elements can come, with extra properties everywhere.
+    /// A square, two triangles of it and an empty face, with extra properties everywhere.
     const HEADER: &str = "element vertex 4\nproperty uchar red\nproperty float x\nproperty float y\nproperty float z\n\
          property list uchar short extra\nelement other 2\nproperty list ushort double a\nproperty int b\n\
          element face 3\nproperty float quality\nproperty list uchar int vertex_indices\nproperty list uchar float uv\n\
@@ -72,16 +73,22 @@ mod tests {
     /// The body that goes with it, written by `put(type size, value)`.
     fn body(mut put: impl FnMut(char, f64)) {
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
-            [('B', 7.0), ('f', x), ('f', y), ('f', 0.0), ('B', 1.0), ('h', -5.0)]
-                .into_iter()
-                .for_each(|(t, v)| put(t, v));
+            for (t, v) in [('B', 7.0), ('f', x), ('f', y), ('f', 0.0), ('B', 1.0), ('h', -5.0)] {
+                put(t, v);
+            }
         }
-        [('H', 1.0), ('d', 0.1), ('i', -1.0), ('H', 0.0), ('i', 8.0)].into_iter().for_each(|(t, v)| put(t, v));
+        for (t, v) in [('H', 1.0), ('d', 0.1), ('i', -1.0), ('H', 0.0), ('i', 8.0)] {
+            put(t, v);
+        }
         for face in [&[0, 1, 2][..], &[0, 1, 2, 3], &[]] {
             put('f', 0.25);
             put('B', face.len() as f64);
-            face.iter().for_each(|&i| put('i', f64::from(i)));
-            [('B', 2.0), ('f', 1.0), ('f', 1.0)].into_iter().for_each(|(t, v)| put(t, v));
+            for &i in face {
+                put('i', f64::from(i));
+            }
+            for (t, v) in [('B', 2.0), ('f', 1.0), ('f', 1.0)] {
+                put(t, v);
+            }
         }
     }
 
@@ -107,7 +114,7 @@ mod tests {
 
     fn ascii() -> Vec<u8> {
         let mut text = format!("ply\nformat ascii 1.0\n{HEADER}");
-        body(|_, value| text += &format!("{value}\n"));
+        body(|_, value| writeln!(text, "{value}").expect("memory takes all"));
         text.into_bytes()
     }
 

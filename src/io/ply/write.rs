@@ -57,7 +57,7 @@ impl Encoder for PlyEncoder {
             }
             Precision::Double => {
                 let (rooms, _) = out.room(24 * points.len()).as_chunks_mut::<8>();
-                let values = points.iter().flat_map(|point| point.to_array());
+                let values = points.iter().flat_map(DVec3::to_array);
                 rooms.iter_mut().zip(values).for_each(|(room, value)| *room = value.to_le_bytes());
                 out.advance(24 * points.len());
             }
@@ -65,9 +65,10 @@ impl Encoder for PlyEncoder {
     }
 
     fn faces(&mut self, arity: usize, corners: &[u32], out: &mut Out) -> Result<()> {
-        if self.has_short_faces && arity == 3 {
-            push_triangles(corners, out);
-            return Ok(());
+        match arity {
+            3 if self.has_short_faces => return Ok(push_triangles(corners, out)),
+            4 if self.has_short_faces => return Ok(push_quads(corners, out)),
+            _ => {}
         }
         for face in corners.chunks_exact(arity) {
             let count = (arity as u32).to_le_bytes();
@@ -96,6 +97,21 @@ fn push_triangles(corners: &[u32], out: &mut Out) {
     out.advance(bytes);
 }
 
+/// The same for records of 17 bytes: the count, and one store of 16.
+fn push_quads(corners: &[u32], out: &mut Out) {
+    const RECORD: usize = 17;
+
+    let (quads, _) = corners.as_chunks::<4>();
+    let bytes = RECORD * quads.len();
+    let (rooms, _) = out.room(bytes).as_chunks_mut::<RECORD>();
+    for (room, &[a, b, c, d]) in rooms.iter_mut().zip(quads) {
+        let corners = u128::from(a) | u128::from(b) << 32 | u128::from(c) << 64 | u128::from(d) << 96;
+        room[0] = 4;
+        room[1..].copy_from_slice(&corners.to_le_bytes());
+    }
+    out.advance(bytes);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,6 +125,12 @@ mod tests {
         push_triangles(&corners[..1500], &mut out);
         push_triangles(&corners[1500..], &mut out);
         push_triangles(&[], &mut out);
+        assert_eq!(out.bytes(), plain);
+
+        let plain: Vec<u8> =
+            corners.chunks(4).flat_map(|t| std::iter::once(4).chain(t.iter().flat_map(|c| c.to_le_bytes()))).collect();
+        let mut out = Out::default();
+        push_quads(&corners, &mut out);
         assert_eq!(out.bytes(), plain);
     }
 

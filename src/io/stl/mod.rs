@@ -259,7 +259,9 @@ impl TriangleSource for StlFile {
         }
         let mut bounds = Bounds::EMPTY;
         self.visit(|triangle| {
-            triangle.into_iter().for_each(|corner| bounds.add(corner));
+            for corner in triangle {
+                bounds.add(corner);
+            }
             Ok(())
         })?;
         self.bounds = Some(bounds);

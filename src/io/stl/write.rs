@@ -71,7 +71,7 @@ impl<P: Position> StlEncoder<P> {
 
     fn count(&mut self) -> Result<()> {
         self.written += 1;
-        if self.is_text || self.written <= u64::from(u32::MAX) {
+        if self.is_text || u32::try_from(self.written).is_ok() {
             return Ok(());
         }
         Err(self.too_many(self.written))
@@ -112,13 +112,11 @@ impl<P: Position> Encoder for StlEncoder<P> {
         for face in corners.chunks_exact(arity) {
             positions.clear();
             for &corner in face {
-                match self.points.get(corner as usize) {
-                    Some(&point) => positions.push(point.load()),
-                    None => {
-                        let problem = format!("a face refers to vertex {corner}, but there are {}", self.points.len());
-                        return Err(self.error(problem, "indices count from 0"));
-                    }
-                }
+                let Some(point) = self.points.get(corner as usize) else {
+                    let problem = format!("a face refers to vertex {corner}, but there are {}", self.points.len());
+                    return Err(self.error(problem, "indices count from 0"));
+                };
+                positions.push(point.load());
             }
             match positions[..] {
                 [a, b, c] => {

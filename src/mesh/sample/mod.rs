@@ -58,17 +58,18 @@ pub fn build(name: &str, detail: u32) -> Result<Mesh> {
     if !(1..=MAX_DETAIL).contains(&detail) {
         return Err(Error::setting("detail", format!("{detail} is not in 1 to {MAX_DETAIL}"), "1 is the default"));
     }
-    match SAMPLES.iter().find(|sample| sample.0 == name) {
-        Some((_, _, make)) => Ok(make(detail)),
-        None => {
-            let known: Vec<&str> = SAMPLES.iter().map(|sample| sample.0).collect();
-            Err(Error::setting("sample", format!("there is no `{name}`"), format!("take one of {}", known.join(", "))))
-        }
+    if let Some((_, _, make)) = SAMPLES.iter().find(|sample| sample.0 == name) {
+        return Ok(make(detail));
     }
+    let known: Vec<&str> = SAMPLES.iter().map(|sample| sample.0).collect();
+    Err(Error::setting("sample", format!("there is no `{name}`"), format!("take one of {}", known.join(", "))))
 }
 
+/// Quads along the knot and around its tube at detail 1.
+const KNOT: [u32; 2] = [280, 36];
+
 fn knot(detail: u32) -> Mesh {
-    tube(36 * detail, 280 * detail, 0.42, |t| {
+    tube(KNOT[1] * detail, KNOT[0] * detail, 0.42, |t| {
         let ((sin2, cos2), (sin3, cos3)) = ((2.0 * TAU * t).sin_cos(), (3.0 * TAU * t).sin_cos());
         DVec3::new((2.0 + cos3) * cos2, (2.0 + cos3) * sin2, sin3)
     })
@@ -76,7 +77,9 @@ fn knot(detail: u32) -> Mesh {
 
 fn knot_holes(detail: u32) -> Mesh {
     let knot = knot(detail);
-    let centers: Vec<DVec3> = (0..7).map(|k| knot.points[(k * knot.points.len() / 7) + 11 * k]).collect();
+    let [along, around] = KNOT.map(|n| n * detail);
+    let center = |k: u32| knot.points[(k * along / 7 * around + (11 * k * detail) % around) as usize];
+    let centers: Vec<DVec3> = (0..7).map(center).collect();
     let radius = |k: usize| 0.16 + 0.03 * k as f64;
     let in_patch = |_, p: DVec3| centers.iter().enumerate().any(|(k, &center)| p.distance(center) < radius(k));
     without_loose_points(&without(&knot, in_patch))

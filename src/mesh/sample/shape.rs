@@ -117,9 +117,9 @@ fn keyhole(rings: &[&[DVec2]]) -> Vec<u32> {
         let pairs = (0..polygon.len()).flat_map(|i| (0..len).map(move |k| (i, k)));
         let distance = |(i, k): (usize, u32)| flat[polygon[i] as usize].distance(flat[(start + k) as usize]);
         let (i, k) = pairs.min_by(|&a, &b| distance(a).total_cmp(&distance(b))).expect("rings have corners");
-        let round = (0..=len).map(|j| start + (k + j) % len).chain([polygon[i]]);
-        let round: Vec<u32> = round.collect();
-        polygon.splice(i + 1..i + 1, round);
+        let round = (0..=len).map(|j| start + (k + j) % len);
+        let there: Vec<u32> = std::iter::once(polygon[i]).chain(round).collect();
+        polygon.splice(i..i, there);
         start += len;
     }
     polygon

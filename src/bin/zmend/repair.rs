@@ -1,0 +1,145 @@
+//! `zmend repair`: the main job.
+
+use crate::args::{RepairArgs, ReportArg};
+use crate::bars::Bars;
+use crate::measure::{Measured, Side};
+use crate::summary::Summary;
+use crate::{digits, goal};
+use glam::DVec3;
+use std::iter;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+use zmend::io::{self, Format, Input, WriteOptions};
+use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
+use zmend::progress::{Progress, Stage};
+use zmend::{Options, RepairReport, Result, repair_into};
+
+/// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
+const SMALL: u64 = 300_000;
+
+pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
+    let goal = args.goal();
+    let format = goal::format(goal, args.write.format.map(Into::into))?;
+    goal::check(goal, &[&args.input], args.write.force)?;
+    let options = Options {
+        depth: args.grid.depth,
+        scale: args.grid.scale,
+        surface: args.surface.kind.into(),
+        // STL has nothing else, and the surface knows better than the writer which diagonals to take.
+        triangles: args.surface.triangles || format == Format::Stl,
+    };
+
+    let bars = Bars::new(!args.tell.quiet && !args.tell.json);
+    let start = Instant::now();
+    bars.begin(Stage::Read, 0);
+    let mut input = Bounded::open(&args.input)?;
+    let is_text = args.write.ascii;
+    let (precision, loses_digits) = digits::choose(&input.bounds, &options, format, is_text)?;
+    let read = start.elapsed();
+    let write_options = WriteOptions { precision, is_text, ..WriteOptions::default() };
+    let mut writer = io::create(goal, format, write_options)?;
+    let report = repair_into(&mut input, &options, &mut writer, &bars)?;
+    let repaired = start.elapsed();
+    bars.begin(Stage::Write, 0);
+    let bytes = writer.finish()?;
+    let total = start.elapsed();
+    if args.tell.quiet {
+        return Ok(ExitCode::SUCCESS);
+    }
+
+    // Before anything is measured, which takes memory of its own.
+    let peak_memory = peak_memory();
+    bars.start("measure", 0);
+    let before = before(&input.input, args.tell.report)?;
+    let after = after(&report, goal, bytes, args.tell.report)?;
+    drop(bars);
+    // The reading was done before the repair asked for it.
+    let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read).map(|&(s, time)| (s.name(), time));
+    let times = iter::once(("read", read))
+        .chain(stages)
+        .chain([("write", total.saturating_sub(repaired)), ("total", total)])
+        .collect();
+    let summary = Summary {
+        input: input.input.info(),
+        before,
+        goal,
+        format,
+        precision,
+        loses_digits,
+        after,
+        options,
+        report,
+        times,
+        peak_memory,
+    };
+    let told = if args.tell.json { summary.print_json() } else { summary.print() };
+    told.map(|()| ExitCode::SUCCESS)
+}
+
+/// An input whose bounds are found once, although both the precision of the output and the repair depend on them.
+struct Bounded {
+    input: Input,
+    bounds: Bounds,
+}
+
+impl Bounded {
+    fn open(path: &Path) -> Result<Self> {
+        let mut input = io::open(path)?;
+        let bounds = input.bounds()?;
+        Ok(Bounded { input, bounds })
+    }
+}
+
+impl TriangleSource for Bounded {
+    fn bounds(&mut self) -> Result<Bounds> {
+        Ok(self.bounds)
+    }
+
+    fn triangles(&mut self, sink: &mut dyn FnMut(&[[DVec3; 3]]) -> Result<()>) -> Result<SourceCounts> {
+        self.input.triangles(sink)
+    }
+
+    fn size_hint(&self) -> Option<u64> {
+        self.input.size_hint()
+    }
+}
+
+/// Whether a mesh of so many faces is measured.
+fn is_measured(faces: u64, report: ReportArg) -> bool {
+    match report {
+        ReportArg::Auto => faces <= SMALL,
+        ReportArg::Brief => false,
+        ReportArg::Full => true,
+    }
+}
+
+fn before(input: &Input, report: ReportArg) -> Result<Side> {
+    let info = input.info();
+    // Pipes cannot be read again; what came from them is in memory.
+    let can_be_read = input.mesh().is_some() || info.path.is_file();
+    let measured = can_be_read && is_measured(info.polygons, report);
+    Ok(Side::new(info, measured.then(|| Measured::input(input)).transpose()?))
+}
+
+fn after(report: &RepairReport, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
+    let MeshSizes { points, faces, corners } = report.sizes;
+    let is_known = goal.is_file() && is_measured(faces, asked);
+    Ok(Side {
+        bytes: Some(bytes),
+        vertices: Some(points),
+        faces,
+        // Closed and manifold by construction: every edge has two corners.
+        euler: Some(points as i64 - (corners / 2) as i64 + faces as i64),
+        volume: Some(report.volume),
+        measured: is_known.then(|| Measured::file(goal)).transpose()?,
+    })
+}
+
+/// The most memory that this process has held at once, where the system tells.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024 * kibibytes)
+}

@@ -1,0 +1,145 @@
+//! How a repair is told: tables for people, JSON for scripts.
+
+use crate::measure::Side;
+use crate::print::{self, Table};
+use crate::{json, units};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use std::time::Duration;
+use zmend::io::{Format, InputInfo, Precision};
+use zmend::{Options, RepairReport, Result, Surface};
+
+/// All that a repair has to tell.
+pub(crate) struct Summary<'a> {
+    pub(crate) input: &'a InputInfo,
+    pub(crate) before: Side,
+    pub(crate) goal: &'a Path,
+    pub(crate) format: Format,
+    /// Precision of the written coordinates.
+    pub(crate) precision: Precision,
+    /// Whether this is too low for the grid, because the format can do no better.
+    pub(crate) loses_digits: bool,
+    pub(crate) after: Side,
+    pub(crate) options: Options,
+    pub(crate) report: RepairReport,
+    /// Wall-clock time of each stage, and in total.
+    pub(crate) times: Vec<(&'static str, Duration)>,
+    pub(crate) peak_memory: Option<u64>,
+}
+
+impl Summary<'_> {
+    pub(crate) fn print(&self) -> Result<()> {
+        let cells = 1u64 << self.options.depth;
+        let cell = units::real(self.report.frame.cell_size());
+        let mut table = Table::default();
+        table.line("", &["before", "after"].map(|s| Some(s.to_owned())));
+        for ((label, before), (_, after)) in self.before.lines().into_iter().zip(self.after.lines()) {
+            table.line(label, &[before, after]);
+        }
+        print::out(&format!(
+            "{} -> {}: {} on a grid of {cells} cells a side, each {cell} wide\n\n{table}\n",
+            self.input.path.display(),
+            self.goal.display(),
+            surface_name(self.options.surface),
+        ))?;
+        self.warnings().iter().for_each(print::warning);
+        let seconds: Vec<String> =
+            self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
+        let memory = self.peak_memory.map_or(String::new(), |bytes| format!(", {} of memory", units::bytes(bytes)));
+        print::out(&format!("{}{memory}\n{}\n", seconds.join(", "), self.verdict()))
+    }
+
+    pub(crate) fn print_json(&self) -> Result<()> {
+        let warnings = self.warnings();
+        warnings.iter().for_each(print::warning);
+        let RepairReport { frame, scan, closing, .. } = &self.report;
+        let seconds: Map<String, Value> =
+            self.times.iter().map(|&(name, time)| (name.to_owned(), json!(time.as_secs_f64()))).collect();
+        let output = json!({
+            "path": self.goal.display().to_string(),
+            "format": self.format.extension(),
+            "coordinate_bits": if self.precision == Precision::Double { 64 } else { 32 },
+            "verdict": self.verdict(),
+        });
+        let all = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "input": json::merged(json::side(&self.before), json::file(self.input)),
+            "output": json::merged(json::side(&self.after), output),
+            "options": {
+                "depth": self.options.depth,
+                "scale": self.options.scale,
+                "surface": surface_name(self.options.surface),
+                "triangles": self.options.triangles,
+                "threads": rayon::current_num_threads(),
+            },
+            "grid": {
+                "origin": json::vector(frame.origin()),
+                "size": frame.size(),
+                "cell_size": frame.cell_size(),
+                "cells_a_side": 1u64 << frame.depth(),
+            },
+            "scan": {
+                "bounds": json::bounds(&self.report.bounds),
+                "polygons": scan.source.polygons,
+                "triangles": scan.source.triangles,
+                "skipped_triangles": scan.skipped_triangles,
+                "hits": scan.hits,
+                "merged_walls": scan.merged_walls,
+            },
+            "closing": {
+                "odd_faces": closing.odd_faces,
+                "rings": closing.rings,
+                "switched": closing.switched,
+            },
+            "octree": {
+                "crossings": self.report.crossings,
+                "bricks": self.report.bricks,
+                "bytes": self.report.octree_bytes,
+                "volume": self.report.volume,
+            },
+            "warnings": warnings,
+            "seconds": seconds,
+            "peak_memory_bytes": self.peak_memory,
+        });
+        print::out(&format!("{all}\n"))
+    }
+
+    /// What the result is, in words.
+    fn verdict(&self) -> String {
+        match &self.after.measured {
+            _ if self.after.faces == 0 => "empty".to_owned(),
+            Some(measured) => measured.verdict(),
+            None => "closed, manifold, oriented: by construction; --report full measures it".to_owned(),
+        }
+    }
+
+    /// All that the user should know.
+    fn warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> = self.report.warnings.iter().map(ToString::to_string).collect();
+        if self.input.trailing_bytes > 0 {
+            let ignored = units::counted(self.input.trailing_bytes, "byte", "bytes");
+            warnings.push(format!("{ignored} behind the end of the input's mesh were ignored"));
+        }
+        if self.loses_digits {
+            let problem = "binary STL files hold 7 digits, too few for cells so small so far from the origin";
+            warnings.push(format!("{problem}: vertices may fall together; write PLY instead"));
+        }
+        if let Some(measured) = &self.after.measured
+            && self.after.faces > 0
+            && !measured.is_solid()
+        {
+            let stl = "; STL joins vertices at one place, other formats do not";
+            let remedy = if self.format == Format::Stl { stl } else { "" };
+            warnings.push(format!("the written file is not the surface of a solid: {}{remedy}", measured.verdict()));
+        }
+        warnings
+    }
+}
+
+fn surface_name(surface: Surface) -> &'static str {
+    match surface {
+        Surface::MarchingCubes => "mc",
+        Surface::DualContouring => "dc",
+        Surface::Quads => "quads",
+    }
+}

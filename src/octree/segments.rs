@@ -1,0 +1,117 @@
+//! A list that grows without moving what is in it.
+
+use std::ops::{Index, IndexMut, Range};
+
+/// A vector in segments of `2^BITS` elements.
+///
+/// A plain vector doubles, and while it moves both copies are held; its memory cannot come from what smaller blocks have given back. Here
+/// every segment is an allocation of moderate size, so that a long list can grow into the room that another one leaves behind.
+#[derive(Debug, Clone)]
+pub struct Segments<T, const BITS: u32> {
+    segments: Vec<Vec<T>>,
+    len: usize,
+}
+
+impl<T, const BITS: u32> Default for Segments<T, BITS> {
+    fn default() -> Self {
+        Segments { segments: Vec::new(), len: 0 }
+    }
+}
+
+impl<T, const BITS: u32> Segments<T, BITS> {
+    const SIZE: usize = 1 << BITS;
+
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no element.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Appends an element.
+    pub fn push(&mut self, element: T) {
+        self.last_segment().push(element);
+        self.len += 1;
+    }
+
+    /// The segment to append to, with room for at least one element.
+    fn last_segment(&mut self) -> &mut Vec<T> {
+        if self.len == self.segments.len() * Self::SIZE {
+            self.segments.push(Vec::with_capacity(Self::SIZE));
+        }
+        self.segments.last_mut().expect("there is room, so there is a segment")
+    }
+
+    /// The elements in order.
+    pub fn iter(&self) -> impl Iterator<Item = &T> + Clone {
+        self.segments.iter().flatten()
+    }
+
+    /// The elements at some places in order.
+    pub fn range(&self, range: Range<usize>) -> impl Iterator<Item = &T> + Clone {
+        let (first, last) = (range.start >> BITS, range.end.div_ceil(Self::SIZE));
+        let segments = self.segments.get(first..last).unwrap_or_default().iter().enumerate();
+        segments.flat_map(move |(i, segment)| {
+            let start = (first + i) << BITS;
+            &segment[range.start.saturating_sub(start)..segment.len().min(range.end - start)]
+        })
+    }
+
+    /// Bytes held.
+    pub fn allocated_bytes(&self) -> usize {
+        self.segments.capacity() * size_of::<Vec<T>>() + self.segments.len() * Self::SIZE * size_of::<T>()
+    }
+}
+
+impl<T: Copy, const BITS: u32> Segments<T, BITS> {
+    /// Appends elements.
+    pub fn extend_from_slice(&mut self, mut elements: &[T]) {
+        while !elements.is_empty() {
+            let segment = self.last_segment();
+            let (here, rest) = elements.split_at(elements.len().min(Self::SIZE - segment.len()));
+            segment.extend_from_slice(here);
+            self.len += here.len();
+            elements = rest;
+        }
+    }
+}
+
+impl<T, const BITS: u32> Index<usize> for Segments<T, BITS> {
+    type Output = T;
+    #[inline]
+    fn index(&self, i: usize) -> &T {
+        &self.segments[i >> BITS][i & (Self::SIZE - 1)]
+    }
+}
+
+impl<T, const BITS: u32> IndexMut<usize> for Segments<T, BITS> {
+    #[inline]
+    fn index_mut(&mut self, i: usize) -> &mut T {
+        &mut self.segments[i >> BITS][i & (Self::SIZE - 1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_a_list() {
+        let plain: Vec<u32> = (0..1000).collect();
+        let mut list = Segments::<u32, 4>::default();
+        list.push(0);
+        list.extend_from_slice(&plain[1..500]);
+        plain[500..].iter().for_each(|&x| list.push(x));
+        assert_eq!(list.len(), 1000);
+        assert!(list.iter().eq(&plain));
+        for (a, b) in [(0, 0), (0, 1000), (15, 17), (16, 32), (33, 900), (1000, 1000), (999, 1000)] {
+            assert!(list.range(a..b).eq(&plain[a..b]), "{a}..{b}");
+        }
+        list[77] = 5;
+        assert_eq!((list[77], list[78]), (5, 78));
+        assert!(list.allocated_bytes() >= 4000);
+    }
+}
