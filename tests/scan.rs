@@ -133,7 +133,7 @@ fn open_surfaces_have_the_odd_faces_that_a_plain_count_finds() {
 /// The odd faces by looking up each edge of each face beside each crossing.
 fn plain_odd_faces(crossings: &Crossings) -> Vec<Key> {
     let mut faces = BTreeSet::new();
-    for brick in crossings.bricks() {
+    for brick in crossings.bricks().iter() {
         let origin = crossings.origin(brick);
         for axis in zmend::grid::Axis::ALL {
             for local in brick.crossed[axis.index()].iter() {
