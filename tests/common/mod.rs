@@ -71,61 +71,57 @@ impl Topology {
     }
 }
 
-/// Checks that a mesh is closed, manifold, oriented and encloses a positive volume, or is empty; by sorted half edges.
+/// Checks that a mesh is closed, manifold, oriented and encloses a positive volume, or is empty; by going round every point.
 pub(crate) fn check(mesh: &Mesh) -> Result<Topology, String> {
     mesh.validate().map_err(|violation| format!("validate: {violation}"))?;
     if let Some(bad) = mesh.points.iter().find(|p| !p.is_finite()) {
         return Err(format!("point {bad}"));
     }
-    let mut halves: Vec<(u32, u32)> = Vec::with_capacity(mesh.faces.corners().len());
-    let mut used = vec![false; mesh.points.len()];
-    let mut sets = Sets::new(mesh.points.len());
-    for face in mesh.faces.iter() {
-        for (i, &a) in face.iter().enumerate() {
-            let b = face[(i + 1) % face.len()];
-            halves.push((a, b));
-            used[a as usize] = true;
-            sets.join(a as usize, b as usize);
-        }
-    }
-    if let Some(point) = used.iter().position(|u| !u) {
+    // For each point, its corners: the point after it in the face, and the one before.
+    let mut firsts = vec![0usize; mesh.points.len() + 1];
+    mesh.faces.corners().iter().for_each(|&i| firsts[i as usize + 1] += 1);
+    if let Some(point) = firsts[1..].iter().position(|&corners| corners == 0) {
         return Err(format!("point {point} is not used"));
     }
-    halves.sort_unstable();
-    if let Some(twice) = halves.windows(2).find(|w| w[0] == w[1]) {
-        return Err(format!("half edge {:?} is there twice", twice[0]));
-    }
-    if let Some(&(a, b)) = halves.iter().find(|&&(a, b)| halves.binary_search(&(b, a)).is_err()) {
-        return Err(format!("half edge {a}-{b} has no opposite"));
-    }
-    // As each point's half edges leave it once, going round the faces at a point must visit all of them: one fan.
-    let mut next: HashMap<(u32, u32), u32> = HashMap::with_capacity(halves.len());
+    (1..firsts.len()).for_each(|i| firsts[i] += firsts[i - 1]);
+    let mut corners = vec![(0u32, 0u32); mesh.faces.corners().len()];
+    let mut ends = firsts.clone();
+    let mut sets = Sets::new(mesh.points.len());
     for face in mesh.faces.iter() {
-        for i in 0..face.len() {
-            let (before, at, after) = (face[(i + face.len() - 1) % face.len()], face[i], face[(i + 1) % face.len()]);
-            next.insert((at, after), before);
+        for (i, &at) in face.iter().enumerate() {
+            let (after, before) = (face[(i + 1) % face.len()], face[(i + face.len() - 1) % face.len()]);
+            corners[ends[at as usize]] = (after, before);
+            ends[at as usize] += 1;
+            sets.join(at as usize, after as usize);
         }
     }
-    let mut start = 0;
-    for of_point in halves.chunk_by(|a, b| a.0 == b.0) {
-        let (at, first) = of_point[0];
-        let (mut spoke, mut n) = (next[&(at, first)], 1);
-        while spoke != first {
-            spoke = next[&(at, spoke)];
+    let around = |point: u32| &corners[firsts[point as usize]..firsts[point as usize + 1]];
+    for point in 0..mesh.points.len() as u32 {
+        let fan = around(point);
+        for (i, corner) in fan.iter().enumerate() {
+            if fan[..i].iter().any(|c| c.0 == corner.0) {
+                return Err(format!("half edge {point}-{} is there twice", corner.0));
+            }
+            if around(corner.0).iter().all(|c| c.0 != point) {
+                return Err(format!("half edge {point}-{} has no opposite", corner.0));
+            }
+        }
+        // Going round the point from face to face must visit all of its corners.
+        let (mut spoke, mut n) = (fan[0].1, 1);
+        while spoke != fan[0].0 {
+            spoke = fan.iter().find(|c| c.0 == spoke).ok_or_else(|| format!("point {point} has an open fan"))?.1;
             n += 1;
         }
-        if n != of_point.len() {
-            return Err(format!("point {at} has {} half edges, but a fan of {n}", of_point.len()));
+        if n != fan.len() {
+            return Err(format!("point {point} has {} corners, but a fan of {n}", fan.len()));
         }
-        start += of_point.len();
     }
-    assert_eq!(start, halves.len());
     let volume = volume(mesh);
     if !mesh.faces.is_empty() && volume <= 0.0 {
         return Err(format!("volume {volume} of {} faces", mesh.faces.len()));
     }
     let components = (0..mesh.points.len()).filter(|&i| sets.find(i) == i).count() as u64;
-    let euler = mesh.points.len() as i64 - halves.len() as i64 / 2 + mesh.faces.len() as i64;
+    let euler = mesh.points.len() as i64 - corners.len() as i64 / 2 + mesh.faces.len() as i64;
     Ok(Topology { components, euler })
 }
 
