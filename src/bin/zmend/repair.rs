@@ -16,7 +16,7 @@ use zmend::progress::{Progress, Stage};
 use zmend::{Options, RepairReport, Result, repair_into};
 
 /// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
-const SMALL: u64 = 300_000;
+const SMALL: u64 = 1_000_000;
 
 pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let goal = args.goal();
