@@ -461,12 +461,12 @@ fn least_corner(cell: Local) -> Vec3A {
 /// Where the vertex of a sheet in a cell goes.
 #[inline]
 fn solve(cell: Local, placement: Placement, sum: &Qef) -> Vec3A {
-    let p = match placement {
-        Placement::SharpFeatures => sum.minimiser(),
-        Placement::MassPoint => sum.mass_point(),
-    };
     let corner = least_corner(cell);
-    p.clamp(corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN))
+    let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
+    match placement {
+        Placement::SharpFeatures => sum.minimiser_within(low, high),
+        Placement::MassPoint => sum.mass_point().clamp(low, high),
+    }
 }
 
 fn is_creased(placement: Placement, sum: &Qef) -> bool {
