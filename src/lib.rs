@@ -17,4 +17,4 @@ pub mod sign;
 
 pub use error::{Error, Place, Result};
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Options, RepairReport, Repaired, Surface, repair, repair_into};
+pub use repair::{Faces, Options, RepairReport, Repaired, Surface, repair, repair_into};

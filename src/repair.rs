@@ -20,13 +20,13 @@ pub struct Options {
     pub scale: f64,
     /// Which surface is extracted. Default [`Surface::MarchingCubes`].
     pub surface: Surface,
-    /// Cut the quadrilaterals of dual surfaces into triangles. Default: no.
-    pub triangles: bool,
+    /// What the faces are. Default [`Faces::Auto`].
+    pub faces: Faces,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { depth: 8, scale: 0.9, surface: Surface::default(), triangles: false }
+        Options { depth: 8, scale: 0.9, surface: Surface::default(), faces: Faces::default() }
     }
 }
 
@@ -36,10 +36,22 @@ pub enum Surface {
     /// Marching cubes: triangles, one point where the surface crosses an edge of the grid.
     #[default]
     MarchingCubes,
-    /// Dual contouring: quadrilaterals, one point a cell, which keeps sharp edges and corners.
+    /// Dual contouring: one point a cell, which keeps sharp edges and corners.
     DualContouring,
-    /// Quadrilaterals with points at the mean of the crossings: smooth, no sharp edges.
+    /// Dual contouring with points at the mean of the crossings: smooth quadrilaterals, no sharp edges.
     Quads,
+}
+
+/// What the faces of a surface are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Faces {
+    /// Polygons for [`Surface::Quads`], triangles for the others.
+    #[default]
+    Auto,
+    /// Triangles; quadrilaterals of dual surfaces are cut along creases.
+    Triangles,
+    /// Quadrilaterals and a few triangles for dual surfaces. Marching cubes makes triangles in any case.
+    Polygons,
 }
 
 impl Surface {
@@ -208,7 +220,12 @@ fn extract(
         Surface::DualContouring => Placement::SharpFeatures,
         Surface::Quads => Placement::MassPoint,
     };
-    dual_contouring(octree, frame, &DualOptions { placement, triangles: options.triangles }, sink, progress)
+    let triangles = match options.faces {
+        Faces::Auto => options.surface != Surface::Quads,
+        Faces::Triangles => true,
+        Faces::Polygons => false,
+    };
+    dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
 }
 
 /// An input without faces gets the unit cube: all checks of options apply, and the result is empty.

@@ -197,7 +197,7 @@ fn every_format_and_surface_is_read_back_closed() {
     let folder = Folder::new();
     for surface in ["mc", "dc", "quads"] {
         for name in ["a.stl", "a.ply", "a.obj", "a.off"] {
-            for more in ["", "--ascii", "--triangles"] {
+            for more in ["", "--ascii", "--faces triangles", "--faces polygons"] {
                 folder.run(&format!("repair knot.ply {name} --force -q -d 6 --surface {surface} {more}")).ok();
                 assert_solid(&folder.path(name));
             }

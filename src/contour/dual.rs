@@ -461,17 +461,12 @@ fn least_corner(cell: Local) -> Vec3A {
 /// Where the vertex of a sheet in a cell goes.
 #[inline]
 fn solve(cell: Local, placement: Placement, sum: &Qef) -> Vec3A {
-    let p = match placement {
-        Placement::SharpFeatures => sum.minimiser(),
-        Placement::MassPoint => sum.mass_point(),
-    };
     let corner = least_corner(cell);
     let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
-    let mass = sum.mass_point().clamp(low, high);
-    let step = p - mass;
-    // Back along the way from the mass point, where the error falls all the way, rather than to the nearest point of the cell.
-    let room = Vec3A::select(step.cmpgt(Vec3A::ZERO), high - mass, mass - low) / step.abs().max(Vec3A::splat(1e-9));
-    (mass + step * room.min_element().min(1.0)).clamp(low, high)
+    match placement {
+        Placement::SharpFeatures => sum.minimiser_within(low, high),
+        Placement::MassPoint => sum.mass_point().clamp(low, high),
+    }
 }
 
 fn is_creased(placement: Placement, sum: &Qef) -> bool {

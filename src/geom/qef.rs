@@ -69,6 +69,40 @@ impl Qef {
     }
 }
 
+/// Constrained minimum.
+impl Qef {
+    /// The same among the points of a box: the minimum stays on a crease, as far as the crease is in the box. If the free minimum lies
+    /// outside, the coordinate that is furthest out is put on its side of the box and the others are solved for again.
+    #[inline]
+    pub fn minimiser_within(&self, low: Vec3A, high: Vec3A) -> Vec3A {
+        let free = self.minimiser();
+        if free.cmpge(low).all() && free.cmple(high).all() { free } else { self.minimiser_on_side(free, low, high) }
+    }
+
+    #[cold]
+    fn minimiser_on_side(&self, mut p: Vec3A, low: Vec3A, high: Vec3A) -> Vec3A {
+        let mass = self.mass_point();
+        let penalty = PENALTY * self.points.w;
+        let mut fixed = [false; 3];
+        for _ in 0..3 {
+            let outside = (low - p).max(p - high).to_array();
+            let open = (0..3).filter(|&a| !fixed[a] && outside[a] > 0.0);
+            let Some(worst) = open.max_by(|&a, &b| outside[a].total_cmp(&outside[b])) else { break };
+            fixed[worst] = true;
+            p[worst] = p[worst].clamp(low[worst], high[worst]);
+            // Gauss and Seidel: with one or two unknowns and a diagonal made positive by the penalty, few rounds will do.
+            for _ in 0..16 {
+                for a in (0..3).filter(|&a| !fixed[a]) {
+                    let row = Vec3A::from_vec4(self.rows[a]);
+                    let rest = self.moments[a] + penalty * mass[a] - (row.dot(p) - row[a] * p[a]);
+                    p[a] = rest / (row[a] + penalty);
+                }
+            }
+        }
+        p.clamp(low, high)
+    }
+}
+
 impl AddAssign<&Qef> for Qef {
     #[inline]
     fn add_assign(&mut self, other: &Qef) {
@@ -105,6 +139,15 @@ mod tests {
             ([0.9, 0.6, 1.0], [0., 1., 0.]),
         ]);
         assert!(q.minimiser().distance(Vec3A::new(0.3, 0.6, 0.5)) < 2e-3, "{}", q.minimiser());
+    }
+
+    /// The crease x = 0.3, y = 1.4 lies outside of the unit box: its nearest points are on the side y = 1, on the plane x = 0.3.
+    #[test]
+    fn outside_of_the_box_the_other_planes_count() {
+        let q =
+            qef(&[([0.3, 0.5, 0.2], [1., 0., 0.]), ([0.8, 1.4, 0.6], [0., 1., 0.]), ([0.3, 0.9, 0.9], [1., 0., 0.])]);
+        let p = q.minimiser_within(Vec3A::ZERO, Vec3A::ONE);
+        assert!((p.x - 0.3).abs() < 2e-3 && p.y == 1.0 && p.z >= 0.0 && p.z <= 1.0, "{p}");
     }
 
     #[test]

@@ -96,9 +96,9 @@ pub(crate) struct SurfaceArgs {
     /// Kind of surface.
     #[arg(short = 's', long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
     pub(crate) kind: SurfaceArg,
-    /// Cut the quadrilaterals of dc and quads into triangles.
-    #[arg(long)]
-    pub(crate) triangles: bool,
+    /// What the faces are: auto is polygons for quads, triangles for mc and dc.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = FacesArg::Auto)]
+    pub(crate) faces: FacesArg,
 }
 
 /// How the result is written.
@@ -138,12 +138,33 @@ impl RepairArgs {
     }
 }
 
+/// Kinds of faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FacesArg {
+    /// Polygons for quads, triangles for mc and dc.
+    Auto,
+    /// Triangles.
+    Triangles,
+    /// Quadrilaterals and a few triangles for dc and quads. Some programs cannot read PLY files with both.
+    Polygons,
+}
+
+impl From<FacesArg> for zmend::Faces {
+    fn from(arg: FacesArg) -> Self {
+        match arg {
+            FacesArg::Auto => zmend::Faces::Auto,
+            FacesArg::Triangles => zmend::Faces::Triangles,
+            FacesArg::Polygons => zmend::Faces::Polygons,
+        }
+    }
+}
+
 /// Kinds of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SurfaceArg {
     /// Marching cubes: triangles.
     Mc,
-    /// Dual contouring: quadrilaterals that keep sharp edges and corners.
+    /// Dual contouring: keeps sharp edges and corners.
     Dc,
     /// Dual contouring without sharp edges: smooth quadrilaterals.
     Quads,

@@ -13,10 +13,10 @@ use std::time::Instant;
 use zmend::io::{self, Format, Input, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
-use zmend::{Options, RepairReport, Result, repair_into};
+use zmend::{Faces, Options, RepairReport, Result, repair_into};
 
 /// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
-const SMALL: u64 = 300_000;
+const SMALL: u64 = 1_000_000;
 
 pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let goal = args.goal();
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         scale: args.grid.scale,
         surface: args.surface.kind.into(),
         // STL has nothing else, and the surface knows better than the writer which diagonals to take.
-        triangles: args.surface.triangles || format == Format::Stl,
+        faces: if format == Format::Stl { Faces::Triangles } else { args.surface.faces.into() },
     };
 
     let bars = Bars::new(!args.tell.quiet && !args.tell.json);

@@ -69,7 +69,7 @@ impl Summary<'_> {
                 "depth": self.options.depth,
                 "scale": self.options.scale,
                 "surface": surface_name(self.options.surface),
-                "triangles": self.options.triangles,
+                "faces": format!("{:?}", self.options.faces).to_lowercase(),
                 "threads": rayon::current_num_threads(),
             },
             "grid": {
