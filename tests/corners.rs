@@ -217,7 +217,7 @@ fn touching_boxes_become_one() {
                     (q.x - 1.0).abs() < 0.5 * cell && low.y < q.y && q.y < high.y && low.z < q.z && q.z < high.z
                 });
                 assert_eq!(on_wall, None, "{what} at depth {depth}");
-                if b.points[7].y == 1.0 {
+                if what == "same wall" || what == "other diagonals" {
                     let one = with_points(&boxed(DVec3::ZERO, b.points[7], false), |p| rotation * p);
                     assert_eq!(mended("one box", &one, depth).0, topology, "{what} at depth {depth}");
                 }
@@ -518,8 +518,8 @@ fn assert_faithful(case: &Clean, mesh: &Mesh) -> Vec<String> {
     failures
 }
 
-/// Everything comes back within half a cell by dual contouring, smooth shapes by marching cubes, too. Marching cubes cannot show what is sharper than its cells: it
-/// cuts edges off by up to 0.7 cells and corners by up to 1.2.
+/// Everything comes back within half a cell by dual contouring, smooth shapes by marching cubes, too. Marching cubes cannot show
+/// what is sharper than its cells: it cuts edges off by up to 0.7 cells and corners by up to 1.2.
 #[test]
 fn clean_samples_come_back_within_half_a_cell() {
     let cases = [
@@ -555,6 +555,19 @@ fn clean_data_come_back_within_half_a_cell() {
         })
         .collect();
     assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// The cheese has needles between its holes that only a grid of depth 11 resolves: until then tips are cut off (depth 8: genus
+/// 129 and five loose tips, 9: 130, 10: 132). Run by hand: `cargo test --test corners cheese -- --ignored`.
+#[test]
+#[ignore = "half a minute and 3 GB"]
+fn the_cheese_is_resolved_at_depth_11() {
+    let Some(data) = data() else { return };
+    let cheese = io::read(data.join("cgal/cheese.off")).expect("readable");
+    assert_eq!(cheese.report().genus, Some(133));
+    let repaired = mend(&cheese, 11, MC);
+    assert_eq!(check_repaired(&repaired), Ok(Topology::new(1, 133)));
+    assert!((volume(&repaired.mesh) / volume(&cheese) - 1.0).abs() < 1e-4);
 }
 
 /// A tray, and the same with 82 rims. Its walls are thinner than the cells below depth 8, where handles are lost.

@@ -79,6 +79,16 @@ pub(crate) fn check(mesh: &Mesh) -> Result<Topology, String> {
 
 /// [`check`] without the library's opinion.
 pub(crate) fn own_check(mesh: &Mesh) -> Result<Topology, String> {
+    let topology = topology_of(mesh)?;
+    let volume = volume(mesh);
+    if !mesh.faces.is_empty() && volume <= 0.0 {
+        return Err(format!("volume {volume} of {} faces", mesh.faces.len()));
+    }
+    Ok(topology)
+}
+
+/// Checks that a mesh is closed, manifold and oriented, one way or the other.
+pub(crate) fn topology_of(mesh: &Mesh) -> Result<Topology, String> {
     if let Some(bad) = mesh.points.iter().find(|p| !p.is_finite()) {
         return Err(format!("point {bad}"));
     }
@@ -121,10 +131,6 @@ pub(crate) fn own_check(mesh: &Mesh) -> Result<Topology, String> {
             return Err(format!("point {point} has {} corners, but a fan of {n}", fan.len()));
         }
     }
-    let volume = volume(mesh);
-    if !mesh.faces.is_empty() && volume <= 0.0 {
-        return Err(format!("volume {volume} of {} faces", mesh.faces.len()));
-    }
     let components = (0..mesh.points.len()).filter(|&i| sets.find(i) == i).count() as u64;
     let euler = mesh.points.len() as i64 - corners.len() as i64 / 2 + mesh.faces.len() as i64;
     Ok(Topology { components, euler })
@@ -132,6 +138,14 @@ pub(crate) fn own_check(mesh: &Mesh) -> Result<Topology, String> {
 
 /// [`check`], and that an empty result says why, and that the report agrees with the mesh.
 pub(crate) fn check_repaired(repaired: &Repaired) -> Result<Topology, String> {
+    check_with(repaired, check)
+}
+
+/// [`check_repaired`] with another check of the mesh itself.
+pub(crate) fn check_with(
+    repaired: &Repaired,
+    check: impl Fn(&Mesh) -> Result<Topology, String>,
+) -> Result<Topology, String> {
     let (mesh, report) = (&repaired.mesh, &repaired.report);
     let topology = check(mesh)?;
     check_warnings(mesh.faces.is_empty(), report)?;
