@@ -24,7 +24,7 @@
 use crate::error::Result;
 use crate::geom::normal::NormalCode;
 use crate::grid::{Axis, Extent, Key};
-use crate::octree::crossings::{Crossings, Sample, Toggle, finest_element, lattice_point};
+use crate::octree::crossings::{Crossings, OFFSET_MARGIN, Sample, Toggle, finest_element, lattice_point};
 use crate::progress::{Progress, Stage, check};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -56,7 +56,7 @@ pub fn close(crossings: Crossings, progress: &dyn Progress) -> Result<(Crossings
         .into_par_iter()
         .map(|ring| {
             check(progress)?;
-            let mut patch = Patch { depth: crossings.depth(), normal: area_vector(&ring), toggles: Vec::new() };
+            let mut patch = Patch { crossings: &crossings, normal: area_vector(&ring), toggles: Vec::new() };
             patch.fill(ring);
             progress.advance(1);
             Ok(patch.toggles)
@@ -140,15 +140,20 @@ fn area_vector(ring: &[Step]) -> DVec3 {
     ring.windows(2).map(|w| (w[0].exit - first.exit).cross(w[1].exit - first.exit)).sum()
 }
 
+/// Lines that pass a lattice point as closely as this, in cells, may pass it on either side: positions of crossings are kept
+/// that far from the ends of their edges, and rounded.
+const NEAR: f64 = 2.0 * OFFSET_MARGIN as f64 / 65536.0;
+
 /// The patch of one ring, as it grows.
-struct Patch {
-    depth: u32,
+struct Patch<'a> {
+    /// What was scanned.
+    crossings: &'a Crossings,
     /// Normal of the hole, any length.
     normal: DVec3,
     toggles: Vec<Toggle>,
 }
 
-impl Patch {
+impl Patch<'_> {
     fn fill(&mut self, ring: Ring) {
         let mut pending = vec![ring];
         while let Some(ring) = pending.pop() {
@@ -193,7 +198,8 @@ impl Patch {
     }
 
     /// The straight line in the plane from where `b` leaves its cell to where `a` leaves its own: the grid edges that it crosses,
-    /// which are switched.
+    /// which are switched. Where it passes a lattice point so closely that rounding decides on which side, it keeps to the surface
+    /// if there is one, so that the patch of a flat sheet cancels all of it.
     fn line(&mut self, plane: Plane, b: &Step, a: &Step) -> Vec<Crossing> {
         let [u, v] = plane.axis.others().map(Axis::index);
         let (from, to) = ([b.exit[u], b.exit[v]], [a.exit[u], a.exit[v]]);
@@ -214,15 +220,29 @@ impl Patch {
                     0.5
                 }
             };
-            let (tu, tv) = (leaves(0), leaves(1));
-            let (d, t) = if tu <= tv { (0, tu) } else { (1, tv) };
-            let other = 1 - d;
+            let t = [leaves(0), leaves(1)];
+            // The edge by which the square is left in each direction.
+            let edge_in = |d: usize| {
+                let mut at = [0; 3];
+                at[plane.axis.index()] = plane.at;
+                at[[u, v][d]] = square[d] + u32::from(goal[d] > square[d]);
+                at[[u, v][1 - d]] = square[1 - d];
+                at
+            };
+            let mut d = usize::from(t[0] > t[1]);
+            if square[1 - d] != goal[1 - d] {
+                let corner = [0, 1].map(|d| f64::from(square[d] + u32::from(goal[d] > square[d])));
+                let beside = delta[0] * (corner[1] - from[1]) - delta[1] * (corner[0] - from[0]);
+                let is_crossed =
+                    |d: usize| self.crossings.is_crossed(self.edge(edge_in(d), plane.axis.others()[1 - d]));
+                if beside.abs() <= NEAR * delta[0].hypot(delta[1]) && !is_crossed(d) && is_crossed(1 - d) {
+                    d = 1 - d;
+                }
+            }
+            let (t, other) = (t[d], 1 - d);
             let up = goal[d] > square[d];
             let along = (from[other] + t * delta[other]).clamp(f64::from(square[other]), f64::from(square[other] + 1));
-            let mut edge_at = [0; 3];
-            edge_at[plane.axis.index()] = plane.at;
-            edge_at[[u, v][d]] = square[d] + u32::from(up);
-            edge_at[[u, v][other]] = square[other];
+            let edge_at = edge_in(d);
             let mut at = DVec3::from(edge_at.map(f64::from));
             at[[u, v][other]] = along;
             self.switch(edge_at, plane.axis.others()[other], along - f64::from(square[other]));
@@ -234,8 +254,12 @@ impl Patch {
         line
     }
 
+    fn edge(&self, at: [u32; 3], axis: Axis) -> Key {
+        finest_element(self.crossings.depth(), at, Extent::from(axis))
+    }
+
     fn switch(&mut self, at: [u32; 3], axis: Axis, position: f64) {
-        let edge = finest_element(self.depth, at, Extent::from(axis));
+        let edge = self.edge(at, axis);
         // Where the line runs askew, it crosses edges in the plane of the hole itself: any slope will do there.
         let mut normal = self.normal;
         let least = 1e-3 * normal.length();

@@ -1,0 +1,105 @@
+//! The main job on every real mesh there is: whatever can be read is repaired to closed, manifold, oriented surfaces.
+//!
+//! `ZMEND_SWEEP_DEPTHS="6,7,8,9" cargo test --test pipeline -- --nocapture` sweeps at other depths than 6 and 7.
+
+mod common;
+
+use common::{SURFACES, Topology, check_repaired, data, files, name, options};
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use zmend::{Mesh, io, repair};
+
+/// What came of one file.
+#[derive(Default)]
+struct Outcome {
+    repairs: usize,
+    empties: usize,
+    refused: Option<String>,
+    failures: Vec<String>,
+    took: Duration,
+}
+
+fn depths() -> Vec<u32> {
+    let list = std::env::var("ZMEND_SWEEP_DEPTHS").unwrap_or_else(|_| "6,7".to_owned());
+    list.split(',').map(|d| d.trim().parse().expect("ZMEND_SWEEP_DEPTHS lists depths: 6,7,8")).collect()
+}
+
+fn sweep(path: &Path, depths: &[u32]) -> Outcome {
+    let start = Instant::now();
+    let mut outcome = Outcome::default();
+    match io::read(path) {
+        Err(error) => outcome.refused = Some(error.to_string()),
+        Ok(mesh) => depths.iter().for_each(|&depth| sweep_mesh(&name(path), &mesh, depth, &mut outcome)),
+    }
+    outcome.took = start.elapsed();
+    outcome
+}
+
+fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, outcome: &mut Outcome) {
+    let mut first: Option<Topology> = None;
+    for (mode, surface, triangles) in SURFACES {
+        let repaired = match repair(mesh.clone(), &options(depth, surface, triangles)) {
+            Ok(repaired) => repaired,
+            Err(error) => {
+                outcome.failures.push(format!("{name} depth {depth} {mode}: refused: {error}"));
+                continue;
+            }
+        };
+        outcome.repairs += 1;
+        outcome.empties += usize::from(repaired.mesh.faces.is_empty());
+        match check_repaired(&repaired) {
+            Ok(topology) if *first.get_or_insert(topology) == topology => {}
+            Ok(topology) => {
+                outcome.failures.push(format!("{name} depth {depth} {mode}: {topology:?}, but mc has {first:?}"));
+            }
+            Err(problem) => outcome.failures.push(format!("{name} depth {depth} {mode}: {problem}")),
+        }
+    }
+}
+
+/// Files that hold no mesh. Everything else must be read.
+const NOT_MESHES: &[&str] = &[
+    "assimp/invalid.off",
+    "assimp/issue623.ply",
+    "assimp-invalid/OutOfMemory.off",
+    "assimp-invalid/empty.off",
+    "assimp-invalid/malformed.obj",
+];
+
+#[test]
+fn every_mesh_is_repaired() {
+    let Some(data) = data() else { return };
+    let depths = depths();
+    let files = files(&data);
+    let start = Instant::now();
+    let outcomes: Vec<Outcome> = files.par_iter().map(|path| sweep(path, &depths)).collect();
+    let sum = |count: fn(&Outcome) -> usize| outcomes.iter().map(count).sum::<usize>();
+    let refused: Vec<String> =
+        files.iter().zip(&outcomes).filter(|(_, o)| o.refused.is_some()).map(|(path, _)| name(path)).collect();
+    println!(
+        "sweep: {} files, {} repairs at depths {depths:?} in {} modes, {} of them empty; {} files refused; {:.1} s",
+        files.len(),
+        sum(|o| o.repairs),
+        SURFACES.len(),
+        sum(|o| o.empties),
+        refused.len(),
+        start.elapsed().as_secs_f64()
+    );
+    for (path, outcome) in files.iter().zip(&outcomes) {
+        if let Some(error) = &outcome.refused {
+            println!("refused: {error}");
+            assert!(error.contains(&*path.file_name().expect("a file").to_string_lossy()), "{error} names the file");
+        }
+        if outcome.empties > 0 {
+            println!("empty: {} in {} of {}", name(path), outcome.empties, outcome.repairs);
+        }
+        if outcome.took > Duration::from_secs(5) {
+            println!("slow: {} took {:.1} s", name(path), outcome.took.as_secs_f64());
+        }
+    }
+    let failures: Vec<&String> = outcomes.iter().flat_map(|o| &o.failures).collect();
+    assert!(failures.is_empty(), "{} failures:\n{failures:#?}", failures.len());
+    assert_eq!(refused, NOT_MESHES);
+    assert!(sum(|o| o.repairs) >= 100 * depths.len() * SURFACES.len(), "the data are all there");
+}
