@@ -122,9 +122,8 @@ impl Projection {
             return;
         }
         let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.half_plane(i, j, columns.0, rows.0));
-        let depth = Depth::new(self, columns, rows);
-        let above = self.tie_is_above(axis);
-        let mut announced = false;
+        // Many small triangles pass between the lines: the rest is worked out at the first hit.
+        let mut plane = None;
         for row in 0..rows.1 - rows.0 {
             let (mut first, mut end) = (0, columns.1 - columns.0);
             for e in &edges {
@@ -134,7 +133,7 @@ impl Projection {
             if first >= end {
                 continue;
             }
-            if !announced {
+            let (depth, above) = plane.get_or_insert_with(|| {
                 let [u, v, w] = self.normal.map(|c| c as f64);
                 let normal = match axis {
                     Axis::X => [w, u, v],
@@ -142,8 +141,8 @@ impl Projection {
                     Axis::Z => [u, v, w],
                 };
                 hits.plane(axis, normal);
-                announced = true;
-            }
+                (Depth::new(self, columns, rows), self.tie_is_above(axis))
+            });
             let mut fixed = depth.row(row).wrapping_add(first.wrapping_mul(depth.du));
             for column in first..end {
                 let code = fixed >> GUARD_BITS;
@@ -153,7 +152,7 @@ impl Projection {
                 let (cell, offset) = if depth.reliable && offset.wrapping_sub(1) as u64 <= 65533 {
                     (code >> 16, offset as u16)
                 } else {
-                    self.exact_depth(u, v, above)
+                    self.exact_depth(u, v, *above)
                 };
                 let (u, v, w) = (u as u32, v as u32, cell as u32);
                 let at = match axis {
@@ -241,8 +240,9 @@ impl Depth {
         let [u, v, w] = p.corners[0];
         let (du, dv) = (((columns.0 << p.shift) - u) as f64, ((rows.0 << p.shift) - v) as f64);
         // Units: fixed-point lattice units so far; `unit` makes them 2^-36 of a cell.
-        let unit = 2f64.powi(16 + GUARD_BITS as i32 - p.shift as i32);
-        let cell = unit * (1i64 << p.shift) as f64;
+        const CELL: u64 = 1 << (16 + GUARD_BITS);
+        let unit = (CELL >> p.shift) as f64;
+        let cell = CELL as f64;
         let reach_u = slope_u.abs() * ((columns.1 - columns.0 + 1) << p.shift) as f64;
         let reach_v = slope_v.abs() * ((rows.1 - rows.0 + 1) << p.shift) as f64;
         // Rounding errors are below 8 ulp of the largest intermediate; 2^60 keeps the fixed point within i64, where
