@@ -133,7 +133,9 @@ fn resolve(
         let block = blocks[n].lock().expect("locked once").take();
         let (block, buckets) = block.expect("each block is resolved once");
         hits.clear();
-        buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
+        for bucket in buckets {
+            bucket.drain_into(hits);
+        }
         sort_hits(hits, spare);
         resolve_block(block, hits, depth, with_normals)
     };
