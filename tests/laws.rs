@@ -40,8 +40,8 @@ proptest! {
     #[test]
     fn any_soup_is_repaired(mesh in soup(), depth in 3u32..=6) {
         let mut first = None;
-        for (mode, surface, triangles) in SURFACES {
-            let repaired = repair(mesh.clone(), &options(depth, surface, triangles)).expect("repairable");
+        for (mode, surface, faces) in SURFACES {
+            let repaired = repair(mesh.clone(), &options(depth, surface, faces)).expect("repairable");
             let topology = check_repaired(&repaired);
             prop_assert!(topology.is_ok(), "{} at depth {}: {:?}", mode, depth, topology);
             prop_assert_eq!(first.get_or_insert_with(|| topology.clone()), &topology, "{} at depth {}", mode, depth);

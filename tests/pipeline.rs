@@ -38,8 +38,8 @@ fn sweep(path: &Path, depths: &[u32]) -> Outcome {
 
 fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, outcome: &mut Outcome) {
     let mut first: Option<Topology> = None;
-    for (mode, surface, triangles) in SURFACES {
-        let repaired = match repair(mesh.clone(), &options(depth, surface, triangles)) {
+    for (mode, surface, faces) in SURFACES {
+        let repaired = match repair(mesh.clone(), &options(depth, surface, faces)) {
             Ok(repaired) => repaired,
             Err(error) => {
                 outcome.failures.push(format!("{name} depth {depth} {mode}: refused: {error}"));

@@ -453,8 +453,8 @@ impl Planes {
                 let around = of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| tangent(e).0);
                 let (n, sum) = around.fold((0.0, Vec3A::ZERO), |(n, sum), p| (n + 1.0, sum + p));
                 let between = least_corner(cell) + 0.25 + 0.5 * point([0; 3], corner).as_vec3a();
-                let own = if n > 0.0 { sum / n } else { between };
-                place(own.lerp(common, 0.25));
+                // A corner that has no crossings is no place of the surface: its vertex only has to differ from the others.
+                place(if n > 0.0 { (sum / n).lerp(common, 0.25) } else { common.lerp(between, 0.25) });
             }
         }
         creased

@@ -28,6 +28,8 @@ use crate::octree::crossings::{Crossings, OFFSET_MARGIN, Sample, Toggle, finest_
 use crate::progress::{Progress, Stage, check};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
 
 /// What [`close`] did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -167,36 +169,33 @@ impl Patch<'_> {
     }
 
     /// Cuts a ring by a plane that it crosses: rings that lie on one side each.
-    fn cut(&mut self, mut ring: Ring, plane: Plane) -> Vec<Ring> {
-        let mut sides = Vec::new();
-        loop {
-            let crossings: Vec<usize> =
-                (0..ring.len()).filter(|&i| plane.parts(ring[i].cell, ring[(i + 1) % ring.len()].cell)).collect();
-            if crossings.is_empty() {
-                sides.push(ring);
-                return sides;
-            }
-            // The two consecutive crossings that lie nearest to each other: the run between them is cut off.
-            let n = crossings.len();
-            let distance = |k: usize| ring[crossings[k]].exit.distance_squared(ring[crossings[(k + 1) % n]].exit);
-            let nearest = (0..n).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).expect("not empty");
-            // The run is made the ring's beginning.
-            let start = (crossings[nearest] + 1) % ring.len();
-            let length = (crossings[(nearest + 1) % n] + ring.len() - crossings[nearest]) % ring.len();
-            ring.rotate_left(start);
-            let mut rest = ring.split_off(length);
+    ///
+    /// The crossings of the plane divide the ring into runs. Time and again the run whose ends lie nearest to each other is cut off,
+    /// and the runs before and after it become one, until a single one is left. Cost: linear in the ring's length, but for a logarithm.
+    fn cut(&mut self, ring: Ring, plane: Plane) -> Vec<Ring> {
+        let mut runs = Runs::new(ring, plane);
+        let mut sides = Vec::with_capacity(runs.list.len());
+        while let Some(i) = runs.nearest() {
+            let (before, after) = (runs.list[i].before, runs.list[i].after);
+            let mut run: Ring = std::mem::take(&mut runs.list[i].steps).into();
             // The run leaves through the plane at `b`; the rest comes back through it at `a`.
-            let (b, a) = (ring[length - 1], rest[rest.len() - 1]);
+            let (b, a) = (*run.last().expect("runs have steps"), runs.end(before));
             let line = self.line(plane, &b, &a);
             // Both new rings follow the line, each on its side: the run from b to a, the rest from a to b.
-            let run_side = b.cell[plane.axis.index()];
-            let rest_side = a.cell[plane.axis.index()];
-            follow(&mut ring, plane, run_side, line.iter().copied());
-            let back = line.iter().rev().map(|l| Crossing { from: l.to, to: l.from, at: l.at });
-            follow(&mut rest, plane, rest_side, back);
-            sides.push(ring);
-            ring = rest;
+            follow(&mut run, plane, b.cell, line.iter().copied());
+            sides.push(run);
+            let mut back = Ring::new();
+            follow(&mut back, plane, a.cell, line.iter().rev().map(|l| Crossing { from: l.to, to: l.from, at: l.at }));
+            let rest = &mut runs.list[before].steps;
+            rest.pop_back();
+            rest.extend(back);
+            if before == after {
+                sides.push(std::mem::take(rest).into());
+                break;
+            }
+            runs.join(before, after);
         }
+        sides
     }
 
     /// The straight line in the plane from where `b` leaves its cell to where `a` leaves its own: the grid edges that it crosses,
@@ -284,18 +283,102 @@ struct Crossing {
 }
 
 /// Closes a run of cells, whose last one lies beside the plane where the line begins, by the cells along the line up to the
-/// one before the line's end, where the run began.
-fn follow(run: &mut Ring, plane: Plane, side: u32, line: impl Iterator<Item = Crossing>) {
+/// one before the line's end, where the run began. Cells are on the side of `from`.
+fn follow(run: &mut Ring, plane: Plane, from: [u32; 3], line: impl Iterator<Item = Crossing>) {
     let [u, v] = plane.axis.others().map(Axis::index);
-    let last = run.pop().expect("a run has cells");
+    // Without a line the run ends where it began, in the one cell beside the plane.
+    run.pop();
     for crossing in line {
-        let mut cell = last.cell;
-        cell[plane.axis.index()] = side;
+        let mut cell = from;
         cell[u] = crossing.from[0];
         cell[v] = crossing.from[1];
         run.push(Step { cell, exit: crossing.at });
     }
-    // Without a line the run ends where it began, in the one cell beside the plane.
+}
+
+/// Part of a ring on one side of a plane: its last step leaves through the plane.
+struct Run {
+    steps: VecDeque<Step>,
+    before: usize,
+    after: usize,
+    /// Entries in the queue from before the run was joined with others do not count.
+    joined: u32,
+}
+
+/// The runs of a ring, and which has the nearest ends.
+struct Runs {
+    list: Vec<Run>,
+    /// Squared distance of the ends (as bits, which have the order of positive numbers), run, how often it had been joined.
+    queue: BinaryHeap<Reverse<(u64, usize, u32)>>,
+}
+
+impl Runs {
+    /// Divides a ring where it goes through the plane. No runs if it does not.
+    fn new(mut ring: Ring, plane: Plane) -> Runs {
+        let leaves = |ring: &Ring, i: usize| plane.parts(ring[i].cell, ring[(i + 1) % ring.len()].cell);
+        let mut runs = Runs { list: Vec::new(), queue: BinaryHeap::new() };
+        if let Some(last) = (0..ring.len()).rev().find(|&i| leaves(&ring, i)) {
+            let start = (last + 1) % ring.len();
+            ring.rotate_left(start);
+        }
+        let mut steps = VecDeque::new();
+        for i in 0..ring.len() {
+            steps.push_back(ring[i]);
+            if leaves(&ring, i) {
+                let i = runs.list.len();
+                runs.list.push(Run {
+                    steps: std::mem::take(&mut steps),
+                    before: i.wrapping_sub(1),
+                    after: i + 1,
+                    joined: 0,
+                });
+            }
+        }
+        let n = runs.list.len();
+        if n > 0 {
+            (runs.list[0].before, runs.list[n - 1].after) = (n - 1, 0);
+        }
+        (0..n).for_each(|i| runs.enqueue(i));
+        runs
+    }
+
+    /// The step by which a run leaves through the plane.
+    fn end(&self, run: usize) -> Step {
+        *self.list[run].steps.back().expect("runs have steps")
+    }
+
+    fn enqueue(&mut self, run: usize) {
+        let distance = self.end(self.list[run].before).exit.distance_squared(self.end(run).exit);
+        self.queue.push(Reverse((distance.to_bits(), run, self.list[run].joined)));
+    }
+
+    /// The run whose ends lie nearest to each other; the first if there are several.
+    fn nearest(&mut self) -> Option<usize> {
+        loop {
+            let Reverse((_, run, joined)) = self.queue.pop()?;
+            if !self.list[run].steps.is_empty() && self.list[run].joined == joined {
+                return Some(run);
+            }
+        }
+    }
+
+    /// Makes a run and the one after the next, between which a run has been cut off, one.
+    fn join(&mut self, first: usize, second: usize) {
+        let mut steps = std::mem::take(&mut self.list[first].steps);
+        let more = &mut self.list[second].steps;
+        // The shorter one is moved.
+        if steps.len() < more.len() {
+            steps.into_iter().rev().for_each(|step| more.push_front(step));
+        } else {
+            steps.append(more);
+            *more = steps;
+        }
+        let before = self.list[first].before;
+        self.list[second].before = before;
+        self.list[before].after = second;
+        self.list[second].joined += 1;
+        self.enqueue(second);
+    }
 }
 
 /// A plane of the grid.

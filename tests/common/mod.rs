@@ -8,7 +8,7 @@ use glam::{DMat3, DQuat, DVec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use zmend::repair::Warning;
-use zmend::{Mesh, Options, RepairReport, Repaired, Surface, io, repair};
+use zmend::{Faces, Mesh, Options, RepairReport, Repaired, Surface, io, repair};
 
 /// The directory of real meshes beside the repository, if it is there.
 pub(crate) fn data() -> Option<PathBuf> {
@@ -35,20 +35,20 @@ pub(crate) fn name(path: &Path) -> String {
     format!("{}/{}", parts[1], parts[0])
 }
 
-/// The four ways to extract a surface: its name, kind, and whether it is cut into triangles.
-pub(crate) const SURFACES: [(&str, Surface, bool); 4] = [
-    ("mc", Surface::MarchingCubes, false),
-    ("dc", Surface::DualContouring, false),
-    ("quads", Surface::Quads, false),
-    ("dc triangles", Surface::DualContouring, true),
+/// The four ways to extract a surface: name, kind, and what its faces are.
+pub(crate) const SURFACES: [(&str, Surface, Faces); 4] = [
+    ("mc", Surface::MarchingCubes, Faces::Auto),
+    ("dc", Surface::DualContouring, Faces::Auto),
+    ("quads", Surface::Quads, Faces::Auto),
+    ("dc polygons", Surface::DualContouring, Faces::Polygons),
 ];
 
-pub(crate) fn options(depth: u32, surface: Surface, triangles: bool) -> Options {
-    Options { depth, surface, triangles, ..Options::default() }
+pub(crate) fn options(depth: u32, surface: Surface, faces: Faces) -> Options {
+    Options { depth, surface, faces, ..Options::default() }
 }
 
 pub(crate) fn mend(mesh: &Mesh, depth: u32, surface: Surface) -> Repaired {
-    repair(mesh.clone(), &options(depth, surface, false)).expect("repairable")
+    repair(mesh.clone(), &options(depth, surface, Faces::Auto)).expect("repairable")
 }
 
 /// What a closed surface is, counted here and not by the library.
@@ -74,6 +74,11 @@ impl Topology {
 /// Checks that a mesh is closed, manifold, oriented and encloses a positive volume, or is empty; by going round every point.
 pub(crate) fn check(mesh: &Mesh) -> Result<Topology, String> {
     mesh.validate().map_err(|violation| format!("validate: {violation}"))?;
+    own_check(mesh)
+}
+
+/// [`check`] without the library's opinion.
+pub(crate) fn own_check(mesh: &Mesh) -> Result<Topology, String> {
     if let Some(bad) = mesh.points.iter().find(|p| !p.is_finite()) {
         return Err(format!("point {bad}"));
     }
