@@ -93,7 +93,11 @@ mod tests {
                 std::hint::black_box((0..spin).fold(n, |a, b| a ^ b));
                 n
             };
-            pool.install(|| in_order(500, &Silent, || (), make, |n| Ok(taken.push(n)))).unwrap();
+            let take = |n| {
+                taken.push(n);
+                Ok(())
+            };
+            pool.install(|| in_order(500, &Silent, || (), make, take)).unwrap();
             assert_eq!(taken, (0..500).collect::<Vec<_>>());
         }
     }

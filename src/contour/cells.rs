@@ -79,7 +79,7 @@ impl<'a> Cells<'a> {
             while word != 0 {
                 // Eight cells along z: their bits in eight planes are eight masks, transposed.
                 let row = word.trailing_zeros() & !7;
-                let bits = self.corners.map(|plane| (plane.0[x] >> row) as u8);
+                let bits = std::array::from_fn(|corner| (self.corners[corner].0[x] >> row) as u8);
                 let masks = transposed(u64::from_le_bytes(bits)).to_le_bytes();
                 for z in Bits(word >> row & 0xff) {
                     each(Local::from_index(x as u32 * 64 + row + z), masks[z as usize]);
@@ -144,9 +144,9 @@ static AT: [u8; 64] = {
     at
 };
 
-/// How far the entry of each edge of a cell is from that of its first edge.
-static EDGE_AT: [u16; 12] = {
-    let mut at = [0; 12];
+/// How far the entry of each edge of a cell is from that of its first edge. Sixteen, so that masked indices need no check.
+static EDGE_AT: [u16; 16] = {
+    let mut at = [0; 16];
     let mut i = 0;
     while i < 12 {
         let start = Edge::ALL[i].corners()[0];
@@ -174,7 +174,7 @@ impl<T: Copy> EdgeTable<T> {
     pub(super) fn at(&self, cell: Local) -> impl Fn(Edge) -> T + '_ {
         let [x, y, z] = cell.coords().map(|c| c as usize);
         let entries = &self.0[x * STEP[0] + y * STEP[1] + z..];
-        move |edge| entries[usize::from(EDGE_AT[edge.index()])]
+        move |edge| entries[usize::from(EDGE_AT[edge.index() & 15])]
     }
 
     /// Makes an entry for each crossing round the cells of a brick.

@@ -86,13 +86,15 @@ fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec
     let mut points = Vec::with_capacity(places.len());
     let mut place = places.start;
     for brick in range.map(|i| &crossings.bricks()[i]) {
+        // The brick's lattice planes in model space.
         let origin = DVec3::from(crossings.origin(brick).map(f64::from));
+        let lattice: [DVec3; 8] = std::array::from_fn(|i| frame.to_model(origin + i as f64));
         for (axis, plane) in brick.crossed.iter().enumerate() {
-            let along = DVec3::AXES[axis];
+            let along = DVec3::AXES[axis] * frame.cell_size();
             plane.iter().for_each(|local| {
-                let [x, y, z] = local.coords().map(f64::from);
-                let offset = position(crossings.offsets()[place]);
-                points.push(frame.to_model(origin + DVec3::new(x, y, z) + along * offset));
+                let [x, y, z] = local.coords().map(|c| c as usize);
+                let start = DVec3::new(lattice[x].x, lattice[y].y, lattice[z].z);
+                points.push(start + along * position(crossings.offsets()[place]));
                 place += 1;
             });
         }

@@ -94,7 +94,8 @@ impl Frame {
         let fine = f64::from(1 << FINE_BITS);
         let q = (p - self.origin) * (fine / self.size) + 0.5;
         // NaN fails both comparisons. Truncation of a positive number is floor, so this rounds to nearest.
-        (q.min_element() >= 1.0 && q.max_element() < fine && !q.is_nan()).then(|| [q.x as i32, q.y as i32, q.z as i32])
+        let is_inside = q.min_element() >= 1.0 && q.max_element() < fine && !q.is_nan();
+        is_inside.then_some([q.x as i32, q.y as i32, q.z as i32])
     }
 
     /// From a position in finest cells (0 ..= 2^depth) to model space.

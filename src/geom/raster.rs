@@ -234,15 +234,17 @@ struct Depth {
 }
 
 impl Depth {
+    /// A cell in these units.
+    const CELL: u64 = 1 << (16 + GUARD_BITS);
+
     fn new(p: &Projection, columns: (i64, i64), rows: (i64, i64)) -> Self {
         let [nu, nv, nw] = p.normal.map(|c| c as f64);
         let (slope_u, slope_v) = (-nu / nw, -nv / nw);
         let [u, v, w] = p.corners[0];
         let (du, dv) = (((columns.0 << p.shift) - u) as f64, ((rows.0 << p.shift) - v) as f64);
         // Units: fixed-point lattice units so far; `unit` makes them 2^-36 of a cell.
-        const CELL: u64 = 1 << (16 + GUARD_BITS);
-        let unit = (CELL >> p.shift) as f64;
-        let cell = CELL as f64;
+        let unit = (Self::CELL >> p.shift) as f64;
+        let cell = Self::CELL as f64;
         let reach_u = slope_u.abs() * ((columns.1 - columns.0 + 1) << p.shift) as f64;
         let reach_v = slope_v.abs() * ((rows.1 - rows.0 + 1) << p.shift) as f64;
         // Rounding errors are below 8 ulp of the largest intermediate; 2^60 keeps the fixed point within i64, where
@@ -414,7 +416,7 @@ mod tests {
                         rest += n[a] * ((i128::from(at[a]) << SHIFT) - i128::from(self.t[0][a]));
                     }
                     let w = axis.index();
-                    let depth = self.t[0][w] as f64 - rest as f64 / n[w] as f64;
+                    let depth = f64::from(self.t[0][w]) - rest as f64 / n[w] as f64;
                     let found = (f64::from(at[w]) + (f64::from(offset) + 0.5) / 65536.0) * f64::from(1 << SHIFT);
                     assert!((depth - found).abs() < f64::from(1u32 << SHIFT) / 32768.0, "{depth} {found}");
                     self.hits += 1;

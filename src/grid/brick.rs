@@ -211,7 +211,7 @@ impl Not for Plane {
 }
 
 /// The positions of the set bits of a word, ascending.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Bits(pub u64);
 
 impl Iterator for Bits {

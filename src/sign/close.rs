@@ -102,7 +102,9 @@ fn trace(crossings: &Crossings, odd: &[Key]) -> Vec<Ring> {
         loop {
             if let Some(&since) = on_walk.get(&cell) {
                 let ring = walk.split_off(since);
-                ring.iter().for_each(|(cell, _)| _ = on_walk.remove(cell));
+                for (cell, _) in &ring {
+                    on_walk.remove(cell);
+                }
                 rings.push(ring.iter().map(|&(cell, face)| step(crossings, cell, odd[face as usize])).collect());
             }
             let exits = at_cell(cell).iter().take_while(|e| e.0 == cell).map(|e| e.1);

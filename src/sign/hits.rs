@@ -182,13 +182,13 @@ impl Hits for HitSorter {
     }
 }
 
-/// Sorts hits by edge, then by offset and normal.
+/// Sorts hits by edge, then by offset and normal. Returns whether some edge has several.
 #[inline(never)]
-pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) {
+pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
     const DIGIT: u32 = 10;
     if hits.len() < 512 {
         hits.sort_unstable();
-        return;
+        return hits.windows(2).any(|pair| pair[0].slot() == pair[1].slot());
     }
     // Two stable passes over the 20 bits of the slot; hits that share an edge are few and sorted afterwards.
     scratch.resize(hits.len(), Hit(0));
@@ -210,15 +210,18 @@ pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) {
         }
         std::mem::swap(hits, scratch);
     }
+    let mut repeated = false;
     let mut i = 1;
     while i < hits.len() {
         if hits[i - 1].slot() == hits[i].slot() {
             let end = i + hits[i..].iter().take_while(|h| h.slot() == hits[i].slot()).count();
             hits[i - 1..end].sort_unstable();
+            repeated = true;
             i = end;
         }
         i += 1;
     }
+    repeated
 }
 
 #[cfg(test)]

@@ -39,6 +39,8 @@ pub fn parity_signs(crossings: Crossings) -> SignedOctree {
         })
         .collect();
     let mut inside = vec![Plane::EMPTY; bricks.len()];
-    signs.into_iter().for_each(|(i, plane)| inside[i as usize] = plane);
+    for (i, plane) in signs {
+        inside[i as usize] = plane;
+    }
     SignedOctree::new(crossings, inside)
 }

@@ -134,8 +134,8 @@ fn resolve(
         let (block, buckets) = block.expect("each block is resolved once");
         hits.clear();
         buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
-        sort_hits(hits, spare);
-        resolve_block(block, hits, depth, with_normals)
+        let repeated = sort_hits(hits, spare);
+        resolve_block(block, hits, repeated, depth, with_normals)
     };
     let mut builder = Builder::new(depth, with_normals);
     let mut merges = Vec::new();
@@ -161,45 +161,58 @@ fn resolve(
 /// Hits as close as this on one edge are one wall, in 65536ths of a cell: room for two roundings.
 const COINCIDENT: u16 = 2;
 
+/// The crossings of a block from its sorted hits; `repeated` says whether some edge has several.
 #[inline(never)]
-fn resolve_block(block: BlockCoords, hits: &[Hit], depth: u32, with_normals: bool) -> Resolved {
+fn resolve_block(block: BlockCoords, hits: &[Hit], repeated: bool, depth: u32, with_normals: bool) -> Resolved {
     let mut out = Resolved { hits: hits.len() as u64, ..Resolved::default() };
     out.offsets.reserve_exact(hits.len());
     out.normals.reserve_exact(if with_normals { hits.len() } else { 0 });
     for of_brick in hits.chunk_by(|a, b| a.brick() == b.brick()) {
         let at = brick_coords(of_brick[0].brick());
-        let key =
-            Key::cell(depth - 3, std::array::from_fn(|a| block[a] * 8 + at[a])).expect("hits lie in the root cube");
+        let at = std::array::from_fn(|a| block[a] * 8 + at[a]);
+        let key = Key::cell(depth - 3, at).expect("hits lie in the root cube");
         let mut crossed = [Plane::EMPTY; 3];
-        let mut i = 0;
-        while i < of_brick.len() {
-            let slot = of_brick[i].slot();
-            let mut n = 1;
-            while i + n < of_brick.len() && of_brick[i + n].slot() == slot {
-                n += 1;
+        if repeated {
+            for edge in of_brick.chunk_by(|a, b| a.slot() == b.slot()) {
+                resolve_edge(edge, depth, at, with_normals, &mut crossed, &mut out);
             }
-            // The middle one: for an odd number of walls the surface that is left when pairs cancel from both ends.
-            let middle = of_brick[i + (n - 1) / 2];
-            let sample = Sample::new(middle.offset(), middle.normal().0);
-            if n % 2 == 1 {
-                crossed[middle.axis()].set(Local::from_index(middle.local()));
-                out.offsets.push(sample.offset);
-                if with_normals {
-                    out.normals.push(sample.normal);
-                }
+        } else {
+            of_brick.iter().for_each(|hit| crossed[hit.axis()].set(Local::from_index(hit.local())));
+            out.offsets.extend(of_brick.iter().map(|hit| Sample::new(hit.offset(), 0).offset));
+            if with_normals {
+                out.normals.extend(of_brick.iter().map(|hit| hit.normal().0));
             }
-            if n > 1 {
-                let walls = of_brick[i..i + n].chunk_by(|a, b| b.offset() - a.offset() <= COINCIDENT).count();
-                if walls % 2 != n % 2 {
-                    let local = Local::from_index(middle.local()).coords();
-                    let point = std::array::from_fn(|a| (block[a] * 8 + at[a]) * 8 + local[a]);
-                    let edge = finest_element(depth, point, Axis::ALL[middle.axis()].into());
-                    out.merges.push(Toggle { edge, sample });
-                }
-            }
-            i += n;
         }
         out.bricks.push((key, crossed));
     }
     out
+}
+
+/// Adds an edge of the brick at `brick` (in bricks) with all its hits.
+fn resolve_edge(
+    hits: &[Hit],
+    depth: u32,
+    brick: [u32; 3],
+    with_normals: bool,
+    crossed: &mut [Plane; 3],
+    out: &mut Resolved,
+) {
+    // The middle one: for an odd number of walls the surface that is left when pairs cancel from both ends.
+    let middle = hits[(hits.len() - 1) / 2];
+    let local = Local::from_index(middle.local());
+    let sample = Sample::new(middle.offset(), middle.normal().0);
+    if hits.len() % 2 == 1 {
+        crossed[middle.axis()].set(local);
+        out.offsets.push(sample.offset);
+        if with_normals {
+            out.normals.push(sample.normal);
+        }
+    }
+    let walls = hits.chunk_by(|a, b| b.offset() - a.offset() <= COINCIDENT).count();
+    if walls % 2 != hits.len() % 2 {
+        let c = local.coords();
+        let point = std::array::from_fn(|a| brick[a] * 8 + c[a]);
+        let edge = finest_element(depth, point, Axis::ALL[middle.axis()].into());
+        out.merges.push(Toggle { edge, sample });
+    }
 }

@@ -33,7 +33,9 @@ pub(super) fn worth_merging(crossings: &Crossings, mut merges: Vec<Toggle>) -> V
     for (i, toggle) in merges.iter().enumerate() {
         for face in toggle.edge.coboundary() {
             let in_question: Vec<usize> = face.boundary().filter_map(|edge| place.get(&edge).copied()).collect();
-            in_question.iter().for_each(|&j| clusters.join(i, j));
+            for &j in &in_question {
+                clusters.join(i, j);
+            }
             // Each face is weighed once, by the first of its edges, and only if its parity is in question.
             if in_question.iter().min() == Some(&i) && in_question.len() % 2 == 1 {
                 let odd = face.boundary().filter(|&edge| crossings.is_crossed(edge)).count() % 2 == 1;

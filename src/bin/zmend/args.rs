@@ -201,7 +201,7 @@ impl From<FormatArg> for Format {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ReportArg {
-    /// Full for each side of at most 300,000 faces, brief for others.
+    /// Full for each side of at most 1,000,000 faces, brief for others.
     Auto,
     /// What the repair knows anyway.
     Brief,

@@ -31,10 +31,9 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<ExitCode> {
-    if let Some(threads) = args.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads));
-        pool.build_global().map_err(|e| Error::setting("threads", e.to_string(), "take fewer"))?;
-    }
+    // The main thread works as well; its memory comes in larger steps than that of the others.
+    let pool = rayon::ThreadPoolBuilder::new().use_current_thread().num_threads(args.threads.map_or(0, usize::from));
+    pool.build_global().map_err(|e| Error::setting("threads", e.to_string(), "take fewer"))?;
     match &args.command {
         Command::Repair(args) => repair::run(args),
         Command::Info(args) => info::run(args),

@@ -66,8 +66,14 @@ impl Encoder for PlyEncoder {
 
     fn faces(&mut self, arity: usize, corners: &[u32], out: &mut Out) -> Result<()> {
         match arity {
-            3 if self.has_short_faces => return Ok(push_triangles(corners, out)),
-            4 if self.has_short_faces => return Ok(push_quads(corners, out)),
+            3 if self.has_short_faces => {
+                push_triangles(corners, out);
+                return Ok(());
+            }
+            4 if self.has_short_faces => {
+                push_quads(corners, out);
+                return Ok(());
+            }
             _ => {}
         }
         for face in corners.chunks_exact(arity) {
