@@ -87,7 +87,7 @@ pub struct RepairReport {
     pub bricks: u64,
     /// Bytes of the octree.
     pub octree_bytes: u64,
-    /// Volume enclosed, in cubed model units, measured along the grid's x-lines.
+    /// Estimate of the volume enclosed, in cubed model units: see [`SignedOctree::volume`]. [`Mesh::report`] has the exact one.
     pub volume: f64,
     /// Size of the extracted surface.
     pub sizes: MeshSizes,

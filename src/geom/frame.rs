@@ -11,6 +11,9 @@ pub const FINE_BITS: u32 = 26;
 /// Least and greatest depth of a grid: bricks are three levels deep, keys hold eighteen.
 pub const DEPTHS: std::ops::RangeInclusive<u32> = 3..=18;
 
+/// The least side of a cell, relative to the largest coordinate: 1/1024 of it is then a unit in the last place of an `f64`.
+const FINEST_CELL: f64 = 1024.0 * f64::EPSILON;
+
 /// Where the root cube lies in model space and how finely it is divided.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -39,7 +42,18 @@ impl Frame {
             let problem = format!("a cube of {size} units at {origin} cannot be divided");
             return Err(Error::setting("box", problem, "scale the model to coordinates between 1e-280 and 1e280"));
         }
-        Ok(Frame { origin, size, depth, cell_size: size / f64::from(1u32 << depth) })
+        let cell_size = size / f64::from(1u32 << depth);
+        let largest = origin.abs().max_element().max(far.abs().max_element());
+        if cell_size < FINEST_CELL * largest {
+            let problem =
+                format!("cells of {cell_size:e} units are too small to be told apart at coordinates of {largest:e}");
+            return Err(Error::setting(
+                "depth",
+                problem,
+                "move the model nearer to the origin, or take a smaller depth",
+            ));
+        }
+        Ok(Frame { origin, size, depth, cell_size })
     }
 
     /// The cube about the centre of `bounds` whose side is the largest extent of the model over `scale`, as PolyMender
@@ -147,6 +161,8 @@ mod tests {
         assert!(Frame::fit(&Bounds::EMPTY, 6, 0.9).is_err());
         let huge = Bounds { min: DVec3::splat(-f64::MAX), max: DVec3::splat(f64::MAX) };
         assert!(Frame::fit(&huge, 6, 0.9).is_err());
+        let far = Bounds { min: DVec3::splat(1e14), max: DVec3::splat(1e14 + 1.0) };
+        assert!(Frame::fit(&far, 6, 0.9).unwrap_err().to_string().contains("nearer to the origin"));
         let point = Bounds { min: DVec3::ONE, max: DVec3::ONE };
         assert_eq!(Frame::fit(&point, 6, 0.9).unwrap().size(), 1.0);
     }

@@ -36,8 +36,10 @@ pub(super) trait Body {
         let least = |kind| match kind {
             Kind::One(scalar) | Kind::List(scalar, _) => self.least_size(scalar),
         };
+        // A record without properties takes no room, so that its count could be anything. Those that are kept are held to a byte.
+        let kept = u64::from(matches!(element.name.as_str(), "vertex" | "face"));
         let record: u64 = element.properties.iter().map(|p| least(p.kind)).sum();
-        let need = element.count.saturating_mul(record);
+        let need = element.count.saturating_mul(record.max(kept));
         // The last value of a text needs no blank behind it.
         if need > self.left() + 1 {
             let (count, name, left) = (element.count, &element.name, self.left());
