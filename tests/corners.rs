@@ -386,7 +386,8 @@ fn thin_slabs_stay_closed_whatever_their_angle() {
         }
         let (topology, repaired) = mended("slab", &slab, 6);
         assert!(topology == Topology::NOTHING || topology == Topology::new(1, 0), "{topology:?}");
-        assert!(repaired.report.volume < 1.1 / 64.0);
+        // Crossings keep 1/1024 of a cell from lattice points: that much a wall of no thickness may seem to have.
+        assert!(repaired.report.volume < 1.1 * thickness + 1e-4, "{}", repaired.report.volume);
     }
 }
 
