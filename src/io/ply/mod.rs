@@ -154,8 +154,8 @@ mod tests {
         let huge = header.replace("vertex 3", "vertex 4000000000000");
         assert!(message(&format!("{huge}end_header\n0 0 0")).contains("4000000000000 of `vertex` need at least"));
         let bare = "ply\nformat ascii 1.0\nelement vertex 4000000000\nelement face 1\nend_header\n0";
-        let error = parse("t.ply", bare.as_bytes()).err().expect("no room for so many").to_string();
-        assert!(error.contains("4000000000 of `vertex` need at least"), "{error}");
+        let Err(error) = parse("t.ply", bare.as_bytes()) else { panic!("there is no room for so many") };
+        assert!(error.to_string().contains("4000000000 of `vertex` need at least"), "{error}");
         assert!(
             message("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n")
                 .contains("no property `y`")
