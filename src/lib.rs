@@ -39,8 +39,8 @@
 //! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside.
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring may in rare
-//!   cases pass through each other.
+//! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
+//!   through each other here and there, mostly at creases and in walls thinner than a cell.
 //!
 //! # Where to find what
 //!
