@@ -239,7 +239,7 @@ impl<'a> Layout<'a> {
             }
         }
         for face in Face::ALL.into_iter().filter(|&f| face_is_inside(f) && irregular(f.corners()[0])) {
-            let ring = ring_of(face);
+            let ring = face.corners();
             let corners = ring.map(|c| (at, c));
             let outward = centre(at) - middle(&ring.map(|c| point(at, c)));
             polygons.push(self.oriented(&corners, outward));
@@ -333,13 +333,6 @@ impl Knot {
 #[inline]
 fn slot(mask: Mask, corner: Corner) -> u32 {
     u32::from(CASES[usize::from(mask)].sheets.vertex[corner.index()])
-}
-
-/// The corners of a face in cyclic order.
-fn ring_of(face: Face) -> [Corner; 4] {
-    let [u, v] = face.axis().others();
-    let base = if face.is_high() { Corner::MIN | face.axis() } else { Corner::MIN };
-    [base, base | u, base | u | v, base | v]
 }
 
 fn point(cell: [u32; 3], corner: Corner) -> DVec3 {

@@ -137,18 +137,10 @@ fn components(mask: Mask) -> [u8; 8] {
     component
 }
 
-/// The corners of a face, counter-clockwise seen from outside of the cell.
-fn corners_seen_from_outside(face: Face) -> [Corner; 4] {
-    let [u, v] = [face.axis().next(), face.axis().next().next()];
-    let base = if face.is_high() { Corner::MIN | face.axis() } else { Corner::MIN };
-    let ring = [base, base | u, base | u | v, base | v];
-    if face.is_high() { ring } else { [ring[0], ring[3], ring[2], ring[1]] }
-}
-
 /// The directed segments in which the surface meets a face: from the edge by which a run of inside corners is entered to the one by
 /// which it is left, going counter-clockwise seen from outside of the cell.
 fn segments(mask: Mask, face: Face) -> impl Iterator<Item = [Edge; 2]> {
-    let ring = corners_seen_from_outside(face);
+    let ring = face.corners();
     let edge_after = move |i: usize| Edge::between(ring[i % 4], ring[(i + 1) % 4]).expect("neighbours on a face");
     (0..4).filter(move |&i| !is_inside(mask, ring[i]) && is_inside(mask, ring[(i + 1) % 4])).map(move |enter| {
         let leave = (enter + 1..enter + 4).find(|&i| !is_inside(mask, ring[(i + 1) % 4])).expect("a corner is outside");
