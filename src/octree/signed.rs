@@ -84,7 +84,9 @@ impl SignedOctree {
     ) -> Self {
         assert!(signs.is_sorted_by(|a, b| a.0 < b.0), "bricks are sorted");
         let mut places = super::LinearOctree::with_capacity(signs.len());
-        (0u32..).zip(signs).for_each(|(place, &(key, _))| drop(places.insert(key, place)));
+        for (place, &(key, _)) in (0u32..).zip(signs) {
+            places.insert(key, place);
+        }
         let crossed = |(key, inside): (Key, Plane)| {
             let touches = [Plane::touches_min_x, Plane::touches_min_y, Plane::touches_min_z];
             for (c, touches) in key.min_corner().into_iter().zip(touches) {
@@ -106,21 +108,25 @@ impl SignedOctree {
         };
         let mut builder = Builder::new(depth, with_normals);
         let (count, piece) = pieces(signs.len(), 64);
-        let make = |list: &mut Vec<Sample>, n| {
+        let make = |(): &mut (), n| {
             let bricks = piece(n).map(|i| {
                 let crossed = crossed(signs[i]);
-                list.clear();
-                samples(i, &crossed, list);
-                let normals = list.iter().filter(|_| with_normals).map(|s| s.normal).collect();
-                (signs[i].0, crossed, list.iter().map(|s| s.offset).collect(), normals)
+                let mut list = Vec::new();
+                samples(i, &crossed, &mut list);
+                (signs[i].0, crossed, list)
             });
             bricks.collect()
         };
-        let append = |bricks: Vec<(Key, [Plane; 3], Vec<u16>, Vec<u16>)>| {
-            bricks.iter().for_each(|(key, crossed, offsets, normals)| builder.push(*key, *crossed, offsets, normals));
+        let append = |bricks: Vec<_>| {
+            for (key, crossed, samples) in bricks {
+                let samples: Vec<Sample> = samples;
+                let offsets: Vec<u16> = samples.iter().map(|s| s.offset).collect();
+                let normals: Vec<u16> = samples.iter().filter(|_| with_normals).map(|s| s.normal).collect();
+                builder.push(key, crossed, &offsets, &normals);
+            }
             Ok(())
         };
-        in_order(count, &Silent, Vec::new, make, append).expect("nothing fails or is cancelled");
+        in_order(count, &Silent, || (), make, append).expect("nothing fails or is cancelled");
         SignedOctree::from_crossings(builder.finish())
     }
 
