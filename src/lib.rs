@@ -94,6 +94,7 @@ pub mod progress;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod repair;
+mod sets;
 pub mod sign;
 
 pub use error::{Error, Place, Result};

@@ -3,7 +3,6 @@
 mod polygon;
 mod report;
 pub mod sample;
-mod sets;
 mod source;
 mod star;
 mod stream;

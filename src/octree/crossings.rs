@@ -200,6 +200,15 @@ impl Crossings {
         brick.plus.map(|place| if place == NO_BRICK { &NOTHING } else { &self.bricks[place as usize] })
     }
 
+    /// The bricks at +x, +y, +z of a brick: the place of each, or its key if it is not in the list, and none beside the root.
+    pub(crate) fn higher(&self, brick: &Brick) -> [Result<usize, Option<Key>>; 3] {
+        let higher = |i: usize| match brick.plus[i] {
+            NO_BRICK => Err(brick.key.toward(toward(PLUS[i]))),
+            place => Ok(place as usize),
+        };
+        [higher(0), higher(1), higher(2)]
+    }
+
     /// The lattice point at which a brick starts, in cells.
     pub fn origin(&self, brick: &Brick) -> [u32; 3] {
         lattice_point(self.depth, brick.key)
@@ -289,6 +298,35 @@ impl Crossings {
         }
         for (key, list) in pending {
             builder.push_toggled(&self, &Brick { key, ..NOTHING.clone() }, &list);
+        }
+        builder.finish()
+    }
+
+    /// Only those crossings that `kept` names for each brick: none that is not there. Cost: linear.
+    #[must_use]
+    pub(crate) fn retained(&self, kept: impl Fn(usize) -> [Plane; 3] + Sync + Send) -> Crossings {
+        let planes: Vec<[Plane; 3]> = (0..self.bricks.len()).into_par_iter().map(kept).collect();
+        let mut builder = Builder::new(self.depth, self.with_normals);
+        let (mut offsets, mut normals) = (Vec::new(), Vec::new());
+        for (brick, kept) in self.bricks.iter().zip(planes) {
+            if kept == brick.crossed {
+                builder.push_copy(self, brick);
+                continue;
+            }
+            let mut place = brick.first as usize;
+            for (crossed, kept) in brick.crossed.iter().zip(&kept) {
+                for local in crossed.iter() {
+                    if kept.get(local) {
+                        let sample = self.sample_at(place);
+                        offsets.push(sample.offset);
+                        normals.push(sample.normal);
+                    }
+                    place += 1;
+                }
+            }
+            builder.push(brick.key, kept, &offsets, &normals);
+            offsets.clear();
+            normals.clear();
         }
         builder.finish()
     }

@@ -20,11 +20,13 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+pub mod components;
 pub mod crossings;
 mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub mod regions;
 pub mod segments;
 pub mod signed;
 mod traverse;

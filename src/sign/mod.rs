@@ -6,10 +6,12 @@
 
 mod close;
 mod hits;
+mod keep;
 mod parity;
 mod scan;
 mod walls;
 
 pub use close::{Closing, close};
+pub use keep::{Keep, Kept, keep};
 pub use parity::parity_signs;
 pub use scan::{Scan, ScanCounts, scan};
