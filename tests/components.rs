@@ -6,6 +6,7 @@ use common::check;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use zmend::Mesh;
 use zmend::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
 use zmend::geom::Frame;
@@ -22,8 +23,14 @@ const DEPTH: u32 = 5;
 const SIDE: u32 = 1 << DEPTH;
 
 /// Signs of all lattice points of a small grid; points on the boundary of the root are outside.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq)]
 struct Dense(Vec<bool>);
+
+impl fmt::Debug for Dense {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries((0..self.0.len()).filter(|&i| self.0[i]).map(point)).finish()
+    }
+}
 
 fn point(i: usize) -> [u32; 3] {
     [i as u32 >> (2 * DEPTH), i as u32 >> DEPTH & (SIDE - 1), i as u32 & (SIDE - 1)]
@@ -78,6 +85,10 @@ impl Dense {
                 continue;
             }
             let mut pending = vec![seed];
+            if seed == 0 {
+                // Beyond the last points of the grid is the outer space.
+                pending.extend((0..self.0.len()).filter(|&i| !self.0[i] && point(i).contains(&(SIDE - 1))));
+            }
             while let Some(i) = pending.pop() {
                 if std::mem::replace(&mut number[i], next) != usize::MAX {
                     continue;
@@ -90,9 +101,6 @@ impl Dense {
                     let p: [u32; 3] = std::array::from_fn(|a| point(i)[a].wrapping_add_signed(step[a]));
                     if p.iter().all(|&c| c < SIDE) && self.0[index(p)] == self.0[i] && number[index(p)] == usize::MAX {
                         pending.push(index(p));
-                    } else if p.contains(&SIDE) && !self.0[i] {
-                        // Beyond the last points of the grid is the outer space.
-                        pending.push(0);
                     }
                 }
             }
