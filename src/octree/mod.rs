@@ -22,6 +22,7 @@
 
 pub mod components;
 pub mod crossings;
+pub mod hits;
 mod locate;
 mod neighbour;
 #[cfg(test)]
@@ -42,6 +43,7 @@ use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
 pub use crossings::Crossings;
+pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;

@@ -14,4 +14,4 @@ mod walls;
 pub use close::{Closing, close};
 pub use keep::{Keep, Kept, keep};
 pub use parity::parity_signs;
-pub use scan::{Scan, ScanCounts, scan};
+pub use scan::{OrientedScan, Scan, ScanCounts, scan, scan_oriented};
