@@ -4,6 +4,7 @@
 //! triangles -> scan -> Crossings -> close -> Crossings without odd faces -> parity -> SignedOctree
 //! ```
 
+mod band;
 mod close;
 mod hits;
 mod keep;
@@ -11,6 +12,7 @@ mod parity;
 mod scan;
 mod walls;
 
+pub use band::{Band, MOST_CELLS};
 pub use close::{Closing, close};
 pub use keep::{Keep, Kept, keep};
 pub use parity::parity_signs;
