@@ -9,6 +9,7 @@ mod hits;
 mod parity;
 mod scan;
 mod walls;
+pub mod winding;
 
 pub use close::{Closing, close};
 pub use parity::parity_signs;
