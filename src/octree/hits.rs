@@ -304,7 +304,8 @@ impl HitsBuilder {
         let HitsBuilder { leaves, several, hits, .. } = self;
         let turns = Vec::new();
         let mut made = OrientedHits { edges, leaves, several, hits, turns };
-        made.turns = (0..made.edges.bricks().len()).into_par_iter().map(|i| made.find_turns(&made.edges.bricks()[i])).collect();
+        made.turns =
+            (0..made.edges.bricks().len()).into_par_iter().map(|i| made.find_turns(&made.edges.bricks()[i])).collect();
         made
     }
 }

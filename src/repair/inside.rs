@@ -47,7 +47,9 @@ impl fmt::Display for Reason {
         f.write_str(match self {
             Reason::Asked => "as asked for",
             Reason::Sound => "the surface is closed, oriented and does not overlap itself",
-            Reason::Overlaps => "the surface is closed and oriented, and solids overlap or lie in each other: their union is taken",
+            Reason::Overlaps => {
+                "the surface is closed and oriented, and solids overlap or lie in each other: their union is taken"
+            }
             Reason::Turned => "the surface is closed, but its faces are not all turned the same way",
             Reason::Open => "the surface is open and its faces are turned the same way",
             Reason::OpenAndTurned => "the surface is open and its faces are turned this way and that",

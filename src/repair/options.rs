@@ -18,7 +18,13 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { depth: 8, scale: 0.9, surface: Surface::default(), faces: Faces::default(), inside: Inside::default() }
+        Options {
+            depth: 8,
+            scale: 0.9,
+            surface: Surface::default(),
+            faces: Faces::default(),
+            inside: Inside::default(),
+        }
     }
 }
 

@@ -15,7 +15,7 @@ const NEAR: f64 = 2.0 * OFFSET_MARGIN as f64 / 65536.0;
 pub(super) struct Patch<'a> {
     /// What was scanned.
     crossings: &'a Crossings,
-    /// Normal of the hole, any length.
+    /// Normal of the part of the hole at work, any length.
     normal: DVec3,
     switches: Vec<Switch>,
 }
@@ -33,17 +33,21 @@ pub(crate) struct Switch {
 impl<'a> Patch<'a> {
     /// The edges that the patch of a ring crosses.
     pub(super) fn of(ring: Ring, crossings: &'a Crossings) -> Vec<Switch> {
-        let mut patch = Patch { crossings, normal: area_vector(&ring), switches: Vec::new() };
+        let mut patch = Patch { crossings, normal: DVec3::ZERO, switches: Vec::new() };
         patch.fill(ring);
         patch.switches
     }
 
     fn fill(&mut self, ring: Ring) {
-        let mut pending = vec![ring];
-        while let Some(ring) = pending.pop() {
+        let mut pending = vec![(ring, DVec3::ZERO)];
+        while let Some((ring, whole)) = pending.pop() {
             let ring = shortened(ring);
             if let Some(plane) = middle_plane(&ring) {
-                pending.extend(self.cut(ring, plane));
+                // A part of the hole faces where its own ring faces, so a patch over a bent hole bends. The ring of a part that has no
+                // area to speak of says nothing: such a part faces where the whole did.
+                let own = area_vector(&ring);
+                self.normal = if own.length_squared() > 1.0 { own } else { whole };
+                pending.extend(self.cut(ring, plane).into_iter().map(|part| (part, self.normal)));
             }
         }
     }

@@ -71,7 +71,8 @@ fn of_brick(hits: &OrientedHits, i: usize) -> Vec<Circulation> {
 fn nets(hits: &OrientedHits, i: usize) -> [Net; 4] {
     let edges = hits.edges();
     let brick = &edges.bricks()[i];
-    let [x, y, z] = edges.plus_places(brick).map(|p| p.map_or_else(Net::default, |p| Net::of(hits, &edges.bricks()[p])));
+    let [x, y, z] =
+        edges.plus_places(brick).map(|p| p.map_or_else(Net::default, |p| Net::of(hits, &edges.bricks()[p])));
     [Net::of(hits, brick), x, y, z]
 }
 

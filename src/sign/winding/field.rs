@@ -160,7 +160,9 @@ impl Field {
         for coarser in (0..=level).rev() {
             let shift = level - coarser;
             let below = point.map(|c| c >> shift);
-            let Some(values) = self.levels.get(coarser as usize).and_then(|l| l.get(brick(coarser, below))) else { continue };
+            let Some(values) = self.levels.get(coarser as usize).and_then(|l| l.get(brick(coarser, below))) else {
+                continue;
+            };
             if shift == 0 {
                 return values[local(below).index() as usize];
             }
@@ -168,7 +170,11 @@ impl Field {
             return Corner::ALL.into_iter().fold(0.0, |sum, corner| {
                 let step: [i64; 3] = std::array::from_fn(|a| i64::from(corner.bits() >> (2 - a) & 1));
                 let weight: f32 = (0..3).map(|a| if step[a] == 1 { part[a] } else { 1.0 - part[a] }).product();
-                if weight == 0.0 { sum } else { sum + weight * self.at(coarser, std::array::from_fn(|a| below[a] + step[a])) }
+                if weight == 0.0 {
+                    sum
+                } else {
+                    sum + weight * self.at(coarser, std::array::from_fn(|a| below[a] + step[a]))
+                }
             });
         }
         unreachable!("the coarsest levels cover the world")
@@ -180,7 +186,8 @@ impl Field {
         let first = world::coords(key).map(|c| 4 * i64::from(c) - 1);
         // They lie in two bricks along each axis at most.
         let bricks: [Option<&Values>; 8] = std::array::from_fn(|n| {
-            let at = std::array::from_fn(|a| (first[a] + if n >> (2 - a) & 1 == 1 { COARSE as i64 - 1 } else { 0 }) >> 3);
+            let at =
+                std::array::from_fn(|a| (first[a] + if n >> (2 - a) & 1 == 1 { COARSE as i64 - 1 } else { 0 }) >> 3);
             world::brick(level, at).and_then(|key| self.levels[level as usize].get(key))
         });
         let mut out = [0.0; COARSE * COARSE * COARSE];

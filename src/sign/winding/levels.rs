@@ -100,7 +100,8 @@ pub(super) struct Steps {
 
 impl Steps {
     pub(super) fn of(net: &Net) -> Steps {
-        let more = net.steep.iter().filter(|(axis, ..)| axis.index() == 0).map(|&(_, local, jump)| (local, jump)).collect();
+        let more =
+            net.steep.iter().filter(|(axis, ..)| axis.index() == 0).map(|&(_, local, jump)| (local, jump)).collect();
         Steps { rises: net.rises[0], falls: net.falls[0], more }
     }
 }

@@ -19,7 +19,8 @@ pub(super) struct Net {
 impl Net {
     pub(super) fn of(hits: &OrientedHits, brick: &Brick) -> Net {
         let leaving = hits.leaving(brick);
-        let mut net = Net { rises: std::array::from_fn(|a| brick.crossed[a] ^ leaving[a]), falls: leaving, steep: Vec::new() };
+        let mut net =
+            Net { rises: std::array::from_fn(|a| brick.crossed[a] ^ leaving[a]), falls: leaving, steep: Vec::new() };
         for (axis, local, of_edge) in hits.several_in(brick) {
             let a = axis.index();
             let sum: i32 = of_edge.iter().copied().map(EdgeHit::jump).sum();

@@ -46,6 +46,11 @@ impl Patches {
         self.rings
     }
 
+    /// The edges that they cross, sorted, and by how much the winding number rises along each.
+    pub fn edges(&self) -> impl Iterator<Item = (Key, i32)> {
+        self.edges.iter().copied()
+    }
+
     /// Area of the patches, as the number of edges that they cross; edges crossed several times count as often.
     pub fn area(&self) -> u64 {
         self.edges.iter().map(|edge| u64::from(edge.1.unsigned_abs())).sum()
@@ -99,17 +104,25 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     // The same again with all bricks through which the surface may run, and those before them, which own edges into them.
     let bricks = bricks.with(field.finest_bricks().iter().filter_map(|&key| world::to_root(depth, key)));
     let mut rows = bricks.rows();
-    let layers = rows.walk(|i| bricks.steps(i), |i| {
-        let key = world::from_root(depth, bricks.keys[i]);
-        let values = field.values(key);
-        Above { rule, values, value: if values.is_some() { 0.0 } else { field.middle(key) }, inside: Plane::EMPTY }
-    });
+    let layers = rows.walk(
+        |i| bricks.steps(i),
+        |i| {
+            let key = world::from_root(depth, bricks.keys[i]);
+            let values = field.values(key);
+            Above { rule, values, value: if values.is_some() { 0.0 } else { field.middle(key) }, inside: Plane::EMPTY }
+        },
+    );
     let mut clipped = 0;
-    let signs: Vec<(Key, Plane)> = bricks.keys.iter().zip(layers).map(|(&key, inside)| {
-        let (inside, off) = clip(depth, key, inside);
-        clipped += off;
-        (key, inside)
-    }).collect();
+    let signs: Vec<(Key, Plane)> = bricks
+        .keys
+        .iter()
+        .zip(layers)
+        .map(|(&key, inside)| {
+            let (inside, off) = clip(depth, key, inside);
+            clipped += off;
+            (key, inside)
+        })
+        .collect();
     let uniform = |key| {
         let number = rows.between(key, depth) as f32;
         is_inside(rule, number - field.middle(world::from_root(depth, key)))
@@ -120,11 +133,40 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
         let origin = lattice_point(depth, *key);
         let elsewhere = |axis, local: Local| {
             let c = local.coords();
-            Smooth { field: &field, patches, depth }.sample(rule, axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
+            Smooth { field: &field, patches, depth }.sample(
+                rule,
+                axis,
+                std::array::from_fn(|a| origin[a] + c[a]),
+                edges.with_normals(),
+            )
         };
         push_samples(hits, *key, inside, crossed, rule, elsewhere, out);
     });
     Ok(Winding { octree, reversed: rule == Rule::Negative, clipped })
+}
+
+/// The winding number at any lattice point, slowly.
+#[cfg(test)]
+pub(super) fn numbers(hits: &OrientedHits, patches: &Patches) -> impl Fn([u32; 3]) -> f64 {
+    let depth = hits.edges().depth();
+    let silent = &crate::progress::Silent;
+    let field = field::solve(depth, patches.sources(depth), patches.dipole(depth), |_, _| false, silent);
+    let field = field.expect("not cancelled");
+    // Whole numbers from jumps along x, added up point by point.
+    let mut jumps: Vec<([u32; 3], i32)> = Vec::new();
+    for brick in hits.edges().bricks().iter() {
+        let origin = hits.edges().origin(brick);
+        hits.for_edges(brick, |axis, local, of_edge| {
+            let c = local.coords();
+            let net = of_edge.iter().map(|hit| hit.jump()).sum();
+            jumps.extend((axis == Axis::X).then(|| (std::array::from_fn(|a| origin[a] + c[a]), net)));
+        });
+    }
+    jumps.extend(patches.ends(depth).filter(|end| end.1 == Axis::X).map(|([start, _], _, jump)| (start, jump)));
+    move |at| {
+        let before = jumps.iter().filter(|(p, _)| p[1..] == at[1..] && p[0] < at[0]).map(|j| j.1).sum::<i32>();
+        f64::from(before) - f64::from(field.at_point(depth, at))
+    }
 }
 
 /// Whether a winding number is inside.
@@ -327,7 +369,10 @@ impl Smooth<'_> {
         let t = (number - threshold - a) / (b - a);
         let position = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 };
         let normal = if with_normals { self.normal(axis, start, end) } else { DVec3::ZERO };
-        Sample::new((position * 65535.0) as u16, if with_normals { NormalCode::encode(axis, normal.to_array()).0 } else { 0 })
+        Sample::new(
+            (position * 65535.0) as u16,
+            if with_normals { NormalCode::encode(axis, normal.to_array()).0 } else { 0 },
+        )
     }
 
     fn jump(&self, start: [u32; 3], axis: Axis) -> i32 {
