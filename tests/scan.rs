@@ -183,7 +183,8 @@ fn oriented_hits_have_the_parity_of_the_plain_scan() {
 fn hits_know_where_faces_are_turned() {
     let sphere = sample::build("sphere", 1).expect("a sample");
     let reversed = sphere.faces.iter().map(|face| face.iter().rev().copied().collect::<Vec<u32>>());
-    let mirrored = Mesh { points: sphere.points.clone(), faces: reversed.collect() };
+    let reversed: Vec<Vec<u32>> = reversed.collect();
+    let mirrored = Mesh { points: sphere.points.clone(), faces: reversed.iter().map(Vec::as_slice).collect() };
     let frame = frame_of(&sphere, 6);
     for (mesh, outward) in [(&sphere, true), (&mirrored, false)] {
         let hits = scan_oriented(&mut &*mesh, &frame, false, &Silent).expect("scanned").hits;

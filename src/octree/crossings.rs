@@ -200,13 +200,11 @@ impl Crossings {
         brick.plus.map(|place| if place == NO_BRICK { &NOTHING } else { &self.bricks[place as usize] })
     }
 
-    /// The bricks at +x, +y, +z of a brick: the place of each, or its key if it is not in the list, and none beside the root.
-    pub(crate) fn higher(&self, brick: &Brick) -> [Result<usize, Option<Key>>; 3] {
-        let higher = |i: usize| match brick.plus[i] {
-            NO_BRICK => Err(brick.key.toward(toward(PLUS[i]))),
-            place => Ok(place as usize),
-        };
-        [higher(0), higher(1), higher(2)]
+    /// The places of the bricks at +x, +y, +z of a brick.
+    #[inline]
+    pub fn plus_places(&self, brick: &Brick) -> [Option<usize>; 3] {
+        let [x, y, z, ..] = brick.plus;
+        [x, y, z].map(|place| (place != NO_BRICK).then_some(place as usize))
     }
 
     /// The lattice point at which a brick starts, in cells.
@@ -329,6 +327,19 @@ impl Crossings {
             normals.clear();
         }
         builder.finish()
+    }
+
+    /// The cells of a brick with a crossed edge: those that hold a piece of the surface.
+    pub(crate) fn mixed_cells(&self, brick: &Brick) -> Plane {
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, pxz, pyz] = self.plus(brick).map(|b| &b.crossed);
+        let x = *x | x.at_plus_y(&py[0]);
+        let next_x = pz[0] | pz[0].at_plus_y(&pyz[0]);
+        let y = *y | y.at_plus_x(&px[1]);
+        let next_y = pz[1] | pz[1].at_plus_x(&pxz[1]);
+        let z = *z | z.at_plus_x(&px[2]);
+        let next_z = py[2] | py[2].at_plus_x(&pxy[2]);
+        x | x.at_plus_z(&next_x) | y | y.at_plus_z(&next_y) | z | z.at_plus_y(&next_z)
     }
 
     /// The first broken invariant, in words. Cost: linear, a few hash probes a brick.

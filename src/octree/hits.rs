@@ -18,11 +18,13 @@
 //! # Cost
 //!
 //! 2 bytes (4 with normals) and a bit an edge, 232 bytes and an index entry a brick; 12 bytes more for an edge with several hits, and 6
-//! for each of these.
+//! for each of these. A byte a brick says how its hits are turned; where all agree, and they mostly do, nobody looks at single bits.
 
 use super::crossings::{Brick, Builder, Crossings, Sample};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// One crossing of an edge by a face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -58,6 +60,30 @@ pub struct OrientedHits {
     leaves: BitList,
     several: Vec<Several>,
     hits: Vec<EdgeHit>,
+    /// One a brick.
+    turns: Vec<Turns>,
+}
+
+/// How the hits of a brick are turned: for each axis, bit `2 axis` if some single hit enters, bit `2 axis + 1` if some leaves; both if some
+/// edge has several.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Turns(u8);
+
+impl Turns {
+    /// Those of several bricks.
+    pub(crate) fn and(self, other: Turns) -> Turns {
+        Turns(self.0 | other.0)
+    }
+
+    /// Whether along each axis all edges have one hit at most, and all of these one orientation.
+    pub(crate) fn are_uniform(self) -> bool {
+        self.0 & self.0 >> 1 & 0b01_01_01 == 0
+    }
+
+    /// Whether hits along `axis` leave, if all do the same.
+    pub(crate) fn leave(self, axis: Axis) -> bool {
+        self.0 >> (2 * axis.index() + 1) & 1 == 1
+    }
 }
 
 impl OrientedHits {
@@ -92,6 +118,7 @@ impl OrientedHits {
             + self.leaves.words.capacity() * size_of::<u64>()
             + self.several.capacity() * size_of::<Several>()
             + self.hits.capacity() * size_of::<EdgeHit>()
+            + self.turns.capacity()
     }
 
     /// Of the hit edges of a brick of [`edges`](Self::edges), those whose hit is left; for edges with several, the middle hit. Cost: a few
@@ -107,6 +134,11 @@ impl OrientedHits {
         })
     }
 
+    /// How the hits of the brick at a place of [`edges`](Self::edges) are turned. Cost: none.
+    pub(crate) fn turns(&self, brick: usize) -> Turns {
+        self.turns[brick]
+    }
+
     /// The edges of a brick that have several hits, in order of axis and position, with all their hits.
     pub fn several_in(&self, brick: &Brick) -> impl Iterator<Item = (Axis, Local, &[EdgeHit])> + Clone {
         let place_of = |place| self.several.partition_point(|s| s.place < place);
@@ -118,6 +150,18 @@ impl OrientedHits {
             let axis = Axis::ALL[usize::from(slot >> 9)];
             (axis, Local::from_index(u32::from(slot)), &self.hits[first as usize..end])
         })
+    }
+
+    fn find_turns(&self, brick: &Brick) -> Turns {
+        let mut place = brick.first as usize;
+        let mut turns = 0;
+        for axis in Axis::ALL {
+            let n = brick.crossed[axis.index()].count() as usize;
+            turns |= self.leaves.occurring(place..place + n) << (2 * axis.index());
+            place += n;
+        }
+        self.several_in(brick).for_each(|(axis, ..)| turns |= 0b11 << (2 * axis.index()));
+        Turns(turns)
     }
 
     /// Calls `each` with every hit edge of a brick, in order of axis and position, and with its hits from the edge's start to its end.
@@ -154,6 +198,10 @@ impl OrientedHits {
         let mut listed = 0;
         for brick in self.edges.bricks().iter() {
             let leaving = self.leaving(brick);
+            let place = self.edges.find(brick.key).expect("it is listed");
+            if self.turns.get(place) != Some(&self.find_turns(brick)) {
+                return Err(format!("brick {} is turned otherwise than it says", brick.key));
+            }
             for (axis, local, hits) in self.several_in(brick) {
                 listed += 1;
                 let at = format!("axis {} at {:?} of brick {}", axis.index(), local.coords(), brick.key);
@@ -253,7 +301,12 @@ impl HitsBuilder {
     pub fn finish(self) -> OrientedHits {
         let edges = self.edges.finish();
         assert_eq!(self.leaves.len, edges.len(), "one orientation an edge");
-        OrientedHits { edges, leaves: self.leaves, several: self.several, hits: self.hits }
+        let HitsBuilder { leaves, several, hits, .. } = self;
+        let turns = Vec::new();
+        let mut made = OrientedHits { edges, leaves, several, hits, turns };
+        made.turns =
+            (0..made.edges.bricks().len()).into_par_iter().map(|i| made.find_turns(&made.edges.bricks()[i])).collect();
+        made
     }
 }
 
@@ -290,6 +343,18 @@ impl BitList {
         }
         // The last word of `other` may have ended within the last but one of ours.
         self.words.truncate(self.len.div_ceil(64));
+    }
+
+    /// Bit 0 if any bit of a range is 0, bit 1 if any is 1.
+    fn occurring(&self, mut range: Range<usize>) -> u8 {
+        let mut found = 0;
+        while !range.is_empty() {
+            let n = range.len().min(64);
+            let bits = self.get(range.start, n as u32);
+            found |= u8::from(bits != !0 >> (64 - n)) | u8::from(bits != 0) << 1;
+            range.start += n;
+        }
+        found
     }
 
     /// `n` bits, at most 64, from place `from` on.
@@ -345,6 +410,8 @@ mod tests {
             for (i, window) in plain.windows(n as usize).enumerate() {
                 let expected = window.iter().rev().fold(0u64, |bits, &bit| bits << 1 | u64::from(bit));
                 prop_assert_eq!(list.get(i, n), expected);
+                let any = |bit| u8::from(window.contains(&bit));
+                prop_assert_eq!(list.occurring(i..i + n as usize), any(false) | any(true) << 1);
             }
         }
 

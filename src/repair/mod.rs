@@ -1,9 +1,11 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod inside;
 mod options;
 mod report;
 
-pub use options::{Faces, Options, Surface};
+pub use inside::{InsideChoice, Reason};
+pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 
 use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
@@ -12,7 +14,7 @@ use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
-use crate::sign::{close, parity_signs, scan};
+use inside::{Told, tell};
 use report::Clock;
 
 /// A repaired mesh and how it came about.
@@ -64,15 +66,10 @@ pub fn repair_into(
         warnings.push(Warning::NoFaces);
     }
     let frame = Frame::fit(&nonempty(bounds), options.depth, options.scale)?;
-    let scanned = clock.time(Stage::Scan, || scan(source, &frame, options.surface.needs_normals(), progress))?;
-    let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
-    let octree = clock.time(Stage::Sign, || {
-        progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
+    let told = tell(source, &frame, options.surface.needs_normals(), options.inside, &mut clock, progress)?;
+    let Told { octree, counts, closing, choice, clipped } = told;
     let sizes = clock.time(Stage::Contour, || extract(&octree, &frame, options, sink, progress))?;
 
-    let counts = scanned.counts;
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
     }
@@ -80,6 +77,7 @@ pub fn repair_into(
         (counts.skipped_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
+        (clipped, Warning::Clipped),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
     Ok(RepairReport {
@@ -87,6 +85,7 @@ pub fn repair_into(
         frame,
         scan: counts,
         closing,
+        inside: choice,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,

@@ -11,6 +11,7 @@ mod keep;
 mod parity;
 mod scan;
 mod walls;
+pub mod winding;
 
 pub use band::{Band, MOST_CELLS};
 pub use close::{Closing, close};

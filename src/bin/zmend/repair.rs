@@ -25,6 +25,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let options = Options {
         depth: args.grid.depth,
         scale: args.grid.scale,
+        inside: args.inside.rule.into(),
         surface: args.surface.kind.into(),
         // STL has nothing else, and the surface knows better than the writer which diagonals to take.
         faces: if format == Format::Stl { Faces::Triangles } else { args.surface.faces.into() },

@@ -16,6 +16,7 @@ Examples:
   zmend repair broken.obj -o fixed.ply --depth 9      twice as fine, four times the faces and time
   zmend repair part.stl fixed.stl --surface dc        keep sharp edges and corners
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
+  zmend repair parts.stl one.stl --inside winding     solids that overlap become one
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
@@ -34,6 +35,8 @@ pub(crate) struct RepairArgs {
     #[command(flatten)]
     pub(crate) grid: GridArgs,
     #[command(flatten)]
+    pub(crate) inside: InsideArgs,
+    #[command(flatten)]
     pub(crate) surface: SurfaceArgs,
     #[command(flatten)]
     pub(crate) write: WriteArgs,
@@ -51,6 +54,15 @@ pub(crate) struct GridArgs {
     /// Part of the grid that the longest side of the model takes, above 0 and below 1.
     #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: f64,
+}
+
+/// What is inside.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Inside")]
+pub(crate) struct InsideArgs {
+    /// How inside is told from outside.
+    #[arg(short, long = "inside", value_name = "RULE", value_enum, default_value_t = InsideArg::Auto)]
+    pub(crate) rule: InsideArg,
 }
 
 /// What is extracted.
@@ -119,6 +131,27 @@ impl From<FacesArg> for zmend::Faces {
             FacesArg::Auto => zmend::Faces::Auto,
             FacesArg::Triangles => zmend::Faces::Triangles,
             FacesArg::Polygons => zmend::Faces::Polygons,
+        }
+    }
+}
+
+/// Rules of what is inside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum InsideArg {
+    /// Look at the input, take one of the others, and tell which and why.
+    Auto,
+    /// What an odd number of walls keeps from the outside. Which way faces are turned makes no difference; overlaps become holes.
+    Parity,
+    /// What the faces go round, by the way they are turned: overlaps become unions, walls inside vanish, holes close smoothly.
+    Winding,
+}
+
+impl From<InsideArg> for zmend::Inside {
+    fn from(arg: InsideArg) -> Self {
+        match arg {
+            InsideArg::Auto => zmend::Inside::Auto,
+            InsideArg::Parity => zmend::Inside::Parity,
+            InsideArg::Winding => zmend::Inside::Winding,
         }
     }
 }
