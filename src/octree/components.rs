@@ -13,8 +13,8 @@
 use super::crossings::{Brick, Crossings};
 use super::regions::Regions;
 use super::signed::SignedOctree;
-use crate::grid::{Axis, Face, Key};
 use crate::grid::brick::{Local, Plane};
+use crate::grid::{Axis, Face, Key};
 use crate::parallel::pieces;
 use rayon::prelude::*;
 

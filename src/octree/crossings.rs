@@ -232,7 +232,7 @@ impl Crossings {
     }
 
     /// The sample at a place of the arrays.
-    pub(super) fn sample_at(&self, place: usize) -> Sample {
+    pub(crate) fn sample_at(&self, place: usize) -> Sample {
         Sample { offset: self.offsets[place], normal: if self.with_normals { self.normals[place] } else { 0 } }
     }
 
