@@ -99,7 +99,7 @@ pub(super) fn tell(
     let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.area() };
     let winding = clock.time(Stage::Sign, || winding_signs(&scan.hits, &patches, progress))?;
     let reason = if asked { Reason::Asked } else { Reason::Open };
-    let choice = InsideChoice { rule: Inside::Winding, reason, reversed: winding.reversed };
+    let choice = InsideChoice { rule: Inside::Winding, reason, reversed: patches.reversed() };
     Ok(Told { octree: winding.octree, counts: scan.counts, closing, choice, clipped: winding.clipped })
 }
 

@@ -33,8 +33,9 @@ pub(super) type Values = [f32; 512];
 const DENSE: u32 = 2;
 /// Bricks with sources so near, in points, are solved as well.
 const REACH: u32 = 2;
-/// Steps of a round, and how many rounds on the coarsest level, on other dense ones, and on those above.
+/// Steps of a round.
 const STEPS: usize = 6;
+/// Rounds on the coarsest level, which starts from nothing; on others, which are cheap; and on the two finest.
 const ROUNDS: [usize; 3] = [20, 3, 1];
 /// A round flattens all that has this or more of the steepness of what alternates from point to point, which has 2.
 const FLATTENED: f64 = 0.3;
@@ -240,7 +241,8 @@ impl Field {
         }
         let mut next = vec![[0.0; 512]; values.len()];
         let weights = weights();
-        for _ in 0..ROUNDS[level.min(DENSE + 1).div_ceil(2) as usize] {
+        let rounds = if level == 0 { ROUNDS[0] } else { ROUNDS[if level + 1 < self.finest { 1 } else { 2 }] };
+        for _ in 0..rounds {
             check(progress)?;
             for weight in weights {
                 next.par_iter_mut().enumerate().for_each(|(i, out)| {

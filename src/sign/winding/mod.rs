@@ -15,7 +15,7 @@
 //! 4. The generalised winding number is w = p - s, where s, the part of the patches, is smooth but for them, and found from coarse to
 //!    fine on the bricks where it matters ([`field`]). What patches were chosen makes no difference to w.
 //! 5. Inside is where w is above one half, counted in the sense in which the whole of the input is oriented: if c + d encloses a negative
-//!    volume, all is taken as turned inside out. (Not where its amount is above one half: on the outer side of an open, nearly flat or
+//!    volume, all is taken as turned inside out, and a surface and its reverse come to exactly the same. (Not where its amount is above one half: on the outer side of an open, nearly flat or
 //!    hollow piece of surface w comes near to -1/2 or goes below.)
 //! 6. An edge whose ends differ is crossed at the hit by which it passes one half; where no hit does, which is in holes, where the line
 //!    between the values at its ends does, with the gradient of w as normal.

@@ -25,6 +25,8 @@ pub struct Patches {
     /// Edges that patches cross, sorted, and by how much the winding number rises along them.
     edges: Vec<(Key, i32)>,
     rings: u64,
+    /// Whether hits and patches enclose a negative volume as they are turned. Then hits count the other way, and `edges` says so as well.
+    reversed: bool,
 }
 
 impl Patches {
@@ -33,12 +35,32 @@ impl Patches {
     /// # Errors
     /// `Cancelled`.
     pub fn new(hits: &OrientedHits, circulations: &[Circulation], progress: &dyn Progress) -> Result<Patches> {
-        let faces: Vec<(Key, i32)> = circulations.iter().map(|c| (c.face, c.strength)).collect();
+        let patches = Patches::turned(hits, circulations, false, progress)?;
+        if Bricks::of_surface(hits, &patches).volume() >= 0 {
+            return Ok(patches);
+        }
+        // Not the same rings the other way: made anew, so that a surface and its reverse come to exactly the same.
+        Patches::turned(hits, circulations, true, progress)
+    }
+
+    fn turned(
+        hits: &OrientedHits,
+        circulations: &[Circulation],
+        reversed: bool,
+        progress: &dyn Progress,
+    ) -> Result<Patches> {
+        let sign = if reversed { -1 } else { 1 };
+        let faces: Vec<(Key, i32)> = circulations.iter().map(|c| (c.face, sign * c.strength)).collect();
         let (mut switches, rings) = span(hits.edges(), &faces, progress)?;
         switches.par_sort_unstable();
         let sum = |same: &[Switch]| (same[0].edge, same.iter().map(|s| if s.rises { 1 } else { -1 }).sum());
-        let edges = switches.chunk_by(|a, b| a.edge == b.edge).map(sum).filter(|&(_, jump)| jump != 0);
-        Ok(Patches { edges: edges.collect(), rings })
+        let edges = switches.chunk_by(|a, b| a.edge == b.edge).map(sum).filter(|&(_, jump)| jump != 0).collect();
+        Ok(Patches { edges, rings, reversed })
+    }
+
+    /// Whether the surface was found to be turned inside out.
+    pub fn reversed(&self) -> bool {
+        self.reversed
     }
 
     /// Number of rings of the boundary: about that of holes.
@@ -67,16 +89,17 @@ impl Patches {
 pub struct Winding {
     /// Where the winding number is above one half.
     pub octree: SignedOctree,
-    /// Whether the input was taken as turned inside out.
-    pub reversed: bool,
     /// Points next to the root's boundary that would be inside: there the surface was clipped.
     pub clipped: u64,
 }
 
-/// Winding numbers above this are inside. A little above one half, for beside a flat open sheet all of them come as near to that as the
-/// sheet is large, from below: a sheet is not to become a crust of what is rounded up. In a hole it moves the surface by a hundredth of
-/// the hole's width.
-const THRESHOLD: f32 = 0.5 + 1.0 / 64.0;
+/// Winding numbers above this are inside, give or take [`HOLD`].
+const THRESHOLD: f32 = 0.5;
+/// Beside a flat sheet the winding number comes as near to one half as the sheet is large, on one side from below, and inside of a solid
+/// from above. What is rounded must not make a crust of the sheet, or a slit in the solid. So points for which patches and hits together
+/// say outside must be above the threshold by this, and those for which they say inside may be below it. It moves the surface by a
+/// sixtieth of a hole's radius.
+const HOLD: f32 = 1.0 / 64.0;
 /// Values of coarser levels are trusted that far.
 const MARGIN: f32 = 0.1;
 
@@ -89,14 +112,13 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     let bricks = Bricks::of_surface(hits, patches);
     let mut rows = bricks.rows();
     rows.walk(|i| bricks.steps(i), |_| ());
-    let rule = if bricks.volume() < 0 { Rule::Negative } else { Rule::Positive };
     let depth = hits.edges().depth();
     let wanted = |key, range| {
         let Some((first, side)) = world::in_root(depth, key) else { return false };
         let cell = |at| Key::cell(depth - 3, at).expect("in the root");
         let (first, last) = (cell(first), cell(first.map(|c| c + side - 1)));
         let number = bricks.none_between(first, last).then(|| rows.between(first, depth));
-        may_pass(rule, number, range)
+        may_pass(number, range)
     };
     let field = field::solve(depth, patches.sources(depth), patches.dipole(depth), wanted, progress)?;
     check(progress)?;
@@ -109,7 +131,7 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
         |i| {
             let key = world::from_root(depth, bricks.keys[i]);
             let values = field.values(key);
-            Above { rule, values, value: if values.is_some() { 0.0 } else { field.middle(key) }, inside: Plane::EMPTY }
+            Above { values, value: if values.is_some() { 0.0 } else { field.middle(key) }, inside: Plane::EMPTY }
         },
     );
     let mut clipped = 0;
@@ -123,18 +145,15 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
             (key, inside)
         })
         .collect();
-    let uniform = |key| {
-        let number = rows.between(key, depth) as f32;
-        is_inside(rule, number - field.middle(world::from_root(depth, key)))
-    };
+    let uniform = |key| rows.between(key, depth) >= least(field.middle(world::from_root(depth, key)));
     let edges = hits.edges();
+    let rule = if patches.reversed { Rule::Negative } else { Rule::Positive };
     let octree = SignedOctree::from_signs(depth, edges.with_normals(), &signs, uniform, |i, crossed, out| {
         let (key, inside) = &signs[i];
         let origin = lattice_point(depth, *key);
         let elsewhere = |axis, local: Local| {
             let c = local.coords();
             Smooth { field: &field, patches, depth }.sample(
-                rule,
                 axis,
                 std::array::from_fn(|a| origin[a] + c[a]),
                 edges.with_normals(),
@@ -142,7 +161,7 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
         };
         push_samples(hits, *key, inside, crossed, rule, elsewhere, out);
     });
-    Ok(Winding { octree, reversed: rule == Rule::Negative, clipped })
+    Ok(Winding { octree, clipped })
 }
 
 /// The winding number at any lattice point, slowly.
@@ -158,34 +177,36 @@ pub(super) fn numbers(hits: &OrientedHits, patches: &Patches) -> impl Fn([u32; 3
         let origin = hits.edges().origin(brick);
         hits.for_edges(brick, |axis, local, of_edge| {
             let c = local.coords();
-            let net = of_edge.iter().map(|hit| hit.jump()).sum();
+            let net = of_edge.iter().map(|hit| if patches.reversed { -hit.jump() } else { hit.jump() }).sum();
             jumps.extend((axis == Axis::X).then(|| (std::array::from_fn(|a| origin[a] + c[a]), net)));
         });
     }
     jumps.extend(patches.ends(depth).filter(|end| end.1 == Axis::X).map(|([start, _], _, jump)| (start, jump)));
+    let sign = if patches.reversed { -1.0 } else { 1.0 };
     move |at| {
         let before = jumps.iter().filter(|(p, _)| p[1..] == at[1..] && p[0] < at[0]).map(|j| j.1).sum::<i32>();
-        f64::from(before) - f64::from(field.at_point(depth, at))
+        sign * (f64::from(before) - f64::from(field.at_point(depth, at)))
     }
 }
 
-/// Whether a winding number is inside.
-fn is_inside(rule: Rule, number: f32) -> bool {
-    if rule == Rule::Negative { -number > THRESHOLD } else { number > THRESHOLD }
+/// Whether a point is inside, from its whole number and its smooth part.
+fn is_inside(number: i32, smooth: f32) -> bool {
+    let hold = if number > 0 { -HOLD } else { HOLD };
+    number as f32 - smooth > THRESHOLD + hold
 }
 
 /// Whether the final surface may run where the smooth part is in a range, and the whole number is known or not.
-fn may_pass(rule: Rule, number: Option<i32>, [low, high]: [f32; 2]) -> bool {
-    let (low, high) = (low - MARGIN, high + MARGIN);
+fn may_pass(number: Option<i32>, [low, high]: [f32; 2]) -> bool {
+    let (low, high) = (least(low - MARGIN), least(high + MARGIN));
     match number {
-        Some(number) => is_inside(rule, number as f32 - low) != is_inside(rule, number as f32 - high),
-        None => least(rule, low) != least(rule, high),
+        Some(number) => (low..high).contains(&number),
+        None => low != high,
     }
 }
 
-/// The least whole number that is above the threshold once a smooth part is taken away; by [`Rule::Negative`], that is not below it.
-fn least(rule: Rule, smooth: f32) -> i32 {
-    if rule == Rule::Negative { (smooth - THRESHOLD).ceil() as i32 } else { (smooth + THRESHOLD).floor() as i32 + 1 }
+/// The least whole number that is inside where the smooth part is not near to what decides.
+fn least(smooth: f32) -> i32 {
+    (smooth + THRESHOLD).floor() as i32 + 1
 }
 
 /// Makes the points on the root's boundary outside. Also returns how many points next to it are inside.
@@ -209,7 +230,6 @@ fn clip(depth: u32, brick: Key, mut inside: Plane) -> (Plane, u64) {
 
 /// The points of a brick whose winding number is inside.
 struct Above<'a> {
-    rule: Rule,
     /// The smooth part, point by point.
     values: Option<&'a Values>,
     /// Where that is not known, the same for all.
@@ -220,12 +240,11 @@ struct Above<'a> {
 impl Layer<Plane> for Above<'_> {
     fn at(&mut self, x: usize, counter: &Counter) {
         let Some(values) = self.values else {
-            let lines = counter.at_least(least(self.rule, self.value));
-            self.inside.0[x] = if self.rule == Rule::Negative { !lines } else { lines };
+            self.inside.0[x] = counter.at_least(least(self.value));
             return;
         };
         let numbers = counter.values();
-        let bit = |line: usize| u64::from(is_inside(self.rule, numbers[line] as f32 - values[64 * x + line]));
+        let bit = |line: usize| u64::from(is_inside(numbers[line], values[64 * x + line]));
         self.inside.0[x] = (0..64).fold(0, |word, line| word | bit(line) << line);
     }
 
@@ -279,6 +298,10 @@ impl<'a> Bricks<'a> {
         let key = self.keys[i];
         let edges = self.hits.edges();
         let mut steps = edges.find(key).map_or_else(Steps::default, |place| steps_of(self.hits, place));
+        if self.patches.reversed {
+            std::mem::swap(&mut steps.rises, &mut steps.falls);
+            steps.more.iter_mut().for_each(|(_, jump)| *jump = -*jump);
+        }
         let (depth, before) = (edges.depth(), steps.more.len());
         for &(edge, jump) in &self.patches.edges[self.patches.range(depth, key)] {
             if edge.dir() == Axis::X.into() {
@@ -358,15 +381,14 @@ struct Smooth<'a> {
 
 impl Smooth<'_> {
     /// Where and how steeply the surface crosses the edge that starts at `start`.
-    fn sample(&self, rule: Rule, axis: Axis, start: [u32; 3], with_normals: bool) -> Sample {
+    fn sample(&self, axis: Axis, start: [u32; 3], with_normals: bool) -> Sample {
         let mut end = start;
         end[axis.index()] += 1;
-        let threshold = if rule == Rule::Negative { -THRESHOLD } else { THRESHOLD };
         let jump = self.jump(start, axis) as f32;
         let (a, b) = (self.field.at_point(self.depth, start), self.field.at_point(self.depth, end) - jump);
         // Along the edge the winding number is this or that whole number less what goes from a to b: the one with which it passes.
-        let number = (threshold + 0.5 * (a + b)).round();
-        let t = (number - threshold - a) / (b - a);
+        let number = (THRESHOLD + 0.5 * (a + b)).round();
+        let t = (number - THRESHOLD - a) / (b - a);
         let position = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 };
         let normal = if with_normals { self.normal(axis, start, end) } else { DVec3::ZERO };
         Sample::new(

@@ -221,7 +221,7 @@ fn numbers_are_those_of_the_solid_angles() {
         let worst = errors.iter().copied().fold((0.0, [0; 3]), |a, b| if b.0 > a.0 { b } else { a });
         let mean = errors.iter().map(|e| e.0).sum::<f64>() / errors.len() as f64;
         println!("{name}: {} points, mean error {mean:.4}, worst {:.4} at {:?}", errors.len(), worst.0, worst.1);
-        assert!(mean < 0.01 && worst.0 < 0.06, "{name}: mean {mean}, worst {worst:?}");
+        assert!(mean < 0.01 && worst.0 < 0.08, "{name}: mean {mean}, worst {worst:?}");
     }
 }
 
@@ -240,12 +240,11 @@ fn a_sieve_keeps_its_volume() {
                 100.0 * (volume / expected - 1.0)
             );
             assert!((volume / expected - 1.0).abs() < 0.02, "detail {detail}, depth {depth}: {volume}, not {expected}");
-            assert!(!winding.reversed && winding.clipped == 0);
+            assert_eq!(winding.clipped, 0);
         }
         let faces: Vec<Vec<u32>> = open.faces.iter().map(|f| f.iter().rev().copied().collect()).collect();
         let reversed = Mesh { points: open.points.clone(), faces: faces.iter().map(Vec::as_slice).collect() };
         let (a, b) = (solve(&open, 6).0, solve(&reversed, 6).0);
-        assert!(b.reversed);
         let (a, b) = (a.octree, b.octree);
         let differ: u32 = a.inside().iter().zip(b.inside()).map(|(a, b)| (*a ^ *b).count()).sum();
         assert_eq!((a.inside().len(), differ), (b.inside().len(), 0));
@@ -271,6 +270,20 @@ fn walls_inside_vanish() {
         let at = DVec3::from(lattice_point(6, brick.key).map(|c| f64::from(c) + 4.0));
         let depth = (frame.to_model(at) - bounds.center()).abs().max_element() / bounds.extent().x;
         assert!(depth > 0.5 - 16.0 / 51.0 || brick.count() == 0, "a wall at {at}");
+    }
+}
+
+/// A sheet alone encloses nothing, whatever its size; nor does it come to anything beside a solid.
+#[test]
+fn flat_sheets_vanish() {
+    let plate = sample::build("plate", 1).expect("a sample");
+    let slanted = glam::DMat3::from_rotation_x(0.3) * glam::DMat3::from_rotation_y(0.4);
+    for (name, turn) in [("straight", glam::DMat3::IDENTITY), ("slanted", slanted)] {
+        let plate = Mesh { points: plate.points.iter().map(|&p| turn * p).collect(), faces: plate.faces.clone() };
+        for depth in 5..=8 {
+            let (winding, _) = solve(&plate, depth);
+            assert_eq!((winding.octree.crossings().len(), winding.clipped), (0, 0), "{name}, depth {depth}");
+        }
     }
 }
 
