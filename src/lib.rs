@@ -36,7 +36,8 @@
 //!
 //! - **The surface is made anew.** It lies within about a cell of the input, but it shares no vertices with it. What is thinner than a
 //!   cell may vanish or grow together: take a greater [`depth`](Options::depth).
-//! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside.
+//! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside, unless it is
+//!   [thickened](Options::thicken).
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
 //! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
@@ -101,7 +102,7 @@ pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
 pub use glam;
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Faces, Inside, Options, RepairReport, Repaired, Surface, repair, repair_into};
+pub use repair::{Faces, Inside, Keep, Options, RepairReport, Repaired, Surface, Thicken, repair, repair_into};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

@@ -1,19 +1,22 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod hull;
 mod inside;
 mod options;
 mod report;
 
+pub use crate::sign::{Keep, Kept, Thicken};
 pub use inside::{InsideChoice, Reason};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 
 use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
+use crate::sign::{check_gap, check_width, keep, thicken};
 use inside::{Told, tell};
 use report::Clock;
 
@@ -65,9 +68,17 @@ pub fn repair_into(
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let frame = Frame::fit(&nonempty(bounds), options.depth, options.scale)?;
-    let told = tell(source, &frame, options.surface.needs_normals(), options.inside, &mut clock, progress)?;
-    let Told { octree, counts, closing, choice, clipped } = told;
+    let frame = Frame::fit(&grown(nonempty(bounds), options), options.depth, options.scale)?;
+    check(options, &frame)?;
+    let told = match options.inside {
+        Inside::Hull => hull::tell(source, &frame, options, &mut clock, progress)?,
+        rule => tell(source, &frame, options.surface.needs_normals(), rule, &mut clock, progress)?,
+    };
+    let Told { mut octree, counts, closing, choice, clipped, vanished } = told;
+    if let Some(width) = options.thicken {
+        octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
+    }
+    let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
     let sizes = clock.time(Stage::Contour, || extract(&octree, &frame, options, sink, progress))?;
 
     if !bounds.is_empty() && octree.crossings().is_empty() {
@@ -78,6 +89,7 @@ pub fn repair_into(
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
         (clipped, Warning::Clipped),
+        (if options.thicken.is_none() { percent(vanished, counts.hits) } else { 0 }, Warning::FacesVanished),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
     Ok(RepairReport {
@@ -86,6 +98,8 @@ pub fn repair_into(
         scan: counts,
         closing,
         inside: choice,
+        vanished,
+        kept,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
@@ -115,6 +129,32 @@ fn extract(
         Faces::Polygons => false,
     };
     dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
+}
+
+/// Refuses what can be told before anything is read.
+fn check(options: &Options, frame: &Frame) -> Result<()> {
+    options.keep.check()?;
+    if let Some(gap) = options.gap {
+        if options.inside != Inside::Hull {
+            return Err(Error::setting("gap", "only the hull has gaps that can be closed", "add `--inside hull`"));
+        }
+        check_gap(gap, frame)?;
+    }
+    options.thicken.map_or(Ok(()), |width| check_width(width, frame))
+}
+
+/// Room for walls and for what closes gaps.
+fn grown(mut bounds: Bounds, options: &Options) -> Bounds {
+    let room = |width: Option<f64>| width.filter(|w| w.is_finite() && *w > 0.0).unwrap_or(0.0);
+    let margin = 0.5 * room(options.thicken).max(room(options.gap));
+    bounds.min -= margin;
+    bounds.max += margin;
+    bounds
+}
+
+/// So many in a hundred, rounded.
+fn percent(part: u64, whole: u64) -> u64 {
+    (100 * part + whole / 2).checked_div(whole).unwrap_or(0)
 }
 
 /// An input without faces gets the unit cube: all checks of options apply, and the result is empty.

@@ -1,5 +1,7 @@
 //! What can be chosen.
 
+use crate::sign::{Keep, Thicken};
+
 /// How to repair: `Options { depth: 9, ..Options::default() }`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
@@ -14,6 +16,16 @@ pub struct Options {
     pub faces: Faces,
     /// How inside is told from outside. Default [`Inside::Auto`].
     pub inside: Inside,
+    /// With [`Inside::Hull`]: gaps between faces are closed up to this width, in model units. Default none.
+    pub gap: Option<f64>,
+    /// Faces that bound nothing get a wall of this width, in model units. Default none: they vanish.
+    pub thicken: Option<f64>,
+    /// Which faces get that wall. Default [`Thicken::Sheets`].
+    pub thicken_what: Thicken,
+    /// Which solids stay. Default [`Keep::All`].
+    pub keep: Keep,
+    /// Whether cavities of solids are filled. Default no.
+    pub drop_cavities: bool,
 }
 
 impl Default for Options {
@@ -24,6 +36,11 @@ impl Default for Options {
             surface: Surface::default(),
             faces: Faces::default(),
             inside: Inside::default(),
+            gap: None,
+            thicken: None,
+            thicken_what: Thicken::default(),
+            keep: Keep::default(),
+            drop_cavities: false,
         }
     }
 }
@@ -77,4 +94,8 @@ pub enum Inside {
     /// without walls in between; a cavity is one whose faces are turned to it. Holes are closed by a smooth surface, the generalised
     /// winding number of one half. See [`sign::winding`](crate::sign::winding).
     Winding,
+    /// Inside is what cannot be reached from infinity without passing through a face, whichever way faces are turned: the outer shell of
+    /// everything, without cavities. Holes and gaps let the outside in unless [`Options::gap`] closes them. See
+    /// [`sign::hull`](crate::sign::hull()).
+    Hull,
 }

@@ -21,8 +21,8 @@
 //! Some 4 us a brick without gaps. With them, that of two bands of r cells: memory and time grow with the surface times r.
 
 use super::band::Band;
-use super::thicken::{check_reach, clipped, for_crossed, sample};
-use crate::error::{Error, Result};
+use super::thicken::{check_gap, clipped, for_crossed, sample};
+use crate::error::Result;
 use crate::geom::Frame;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Face, Key};
@@ -69,9 +69,6 @@ fn tolerance(radius: f64) -> f64 {
     0.1 + 0.08 / radius
 }
 
-/// The least radius, in cells: below, a ball passes between lattice points.
-const LEAST_RADIUS: f64 = 0.3;
-
 /// As [`hull`], after gaps between faces up to a width of `gap` model units are closed. `hits` are those of the same source and frame.
 ///
 /// # Errors
@@ -84,11 +81,7 @@ pub fn hull_with_gap(
     progress: &dyn Progress,
 ) -> Result<SignedOctree> {
     let radius = 0.5 * gap / frame.cell_size();
-    if !(radius >= LEAST_RADIUS) {
-        let problem = format!("{gap} units are {:.2} cells: gaps so narrow are closed anyway", 2.0 * radius);
-        return Err(Error::setting("gap", problem, "leave it out, or take a greater depth"));
-    }
-    check_reach("gap", 0.5 * gap, frame)?;
+    check_gap(gap, frame)?;
     let faces = Band::around(source, frame, radius, progress)?;
     let far = Walls::new(hits, &[&faces], |key| !faces.within(key, radius));
     let far_regions = Regions::new(&far);

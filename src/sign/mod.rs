@@ -21,4 +21,4 @@ pub use hull::{hull, hull_with_gap};
 pub use keep::{Keep, Kept, keep};
 pub use parity::parity_signs;
 pub use scan::{OrientedScan, Scan, ScanCounts, scan, scan_oriented};
-pub use thicken::{Thicken, check_width, thicken};
+pub use thicken::{Thicken, check_gap, check_width, thicken, vanished};

@@ -19,6 +19,7 @@ use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
 use crate::mesh::TriangleSource;
 use crate::octree::crossings::{Sample, lattice_point};
+use crate::octree::hits::OrientedHits;
 use crate::octree::signed::{SignedOctree, Uniform};
 use crate::progress::Progress;
 use glam::{DVec3, Vec3};
@@ -36,6 +37,26 @@ pub enum Thicken {
 
 /// The thinnest wall, in cells: thinner ones would tear.
 const LEAST_CELLS: f64 = 2.0;
+
+/// The least radius of a ball that rolls round a surface, in cells: a smaller one passes between lattice points.
+const LEAST_RADIUS: f64 = 0.3;
+
+/// Edges that faces hit and that the surface does not cross, with both ends outside: a measure of open sheets, which vanish. A plane of area A,
+/// in cells, hits 1 to 1.7 A edges.
+pub fn vanished(hits: &OrientedHits, octree: &SignedOctree) -> u64 {
+    let edges = hits.edges();
+    let uniform = octree.uniform();
+    let of_brick = |i: usize| {
+        let brick = &edges.bricks()[i];
+        let (crossed, inside) = match octree.crossings().find(brick.key) {
+            Some(j) => (octree.crossings().bricks()[j].crossed, octree.inside()[j]),
+            None if uniform.is_inside(brick.key) => return 0,
+            None => ([Plane::EMPTY; 3], Plane::EMPTY),
+        };
+        (0..3).map(|a| u64::from((brick.crossed[a] & !crossed[a] & !inside).count())).sum()
+    };
+    (0..edges.bricks().len()).into_par_iter().map(of_brick).sum()
+}
 
 /// Adds walls of `width` model units, half on each side, to the solids of `octree`, which was made from the same source and frame.
 ///
@@ -82,6 +103,19 @@ pub fn check_width(width: f64, frame: &Frame) -> Result<()> {
         return Err(Error::setting("thicken", problem, remedy));
     }
     check_reach("thicken", 0.5 * width, frame)
+}
+
+/// Refuses gaps that the grid cannot show.
+///
+/// # Errors
+/// Names the depth that would do.
+pub fn check_gap(width: f64, frame: &Frame) -> Result<()> {
+    let cells = width / frame.cell_size();
+    if cells >= 2.0 * LEAST_RADIUS {
+        return check_reach("gap", 0.5 * width, frame);
+    }
+    let problem = format!("{width} units are {cells:.2} cells: gaps so narrow let nothing through");
+    Err(Error::setting("gap", problem, "leave it out, or take a greater depth"))
 }
 
 /// Refuses bands that are wider than their numbers can tell.

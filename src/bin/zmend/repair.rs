@@ -26,6 +26,11 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         depth: args.grid.depth,
         scale: args.grid.scale,
         inside: args.inside.rule.into(),
+        gap: args.inside.gap,
+        thicken: args.inside.thicken,
+        thicken_what: args.inside.thicken_what.into(),
+        keep: args.inside.keep,
+        drop_cavities: args.inside.drop_cavities,
         surface: args.surface.kind.into(),
         // STL has nothing else, and the surface knows better than the writer which diagonals to take.
         faces: if format == Format::Stl { Faces::Triangles } else { args.surface.faces.into() },

@@ -45,6 +45,8 @@ pub struct Closing {
     pub rings: u64,
     /// Edges that were switched.
     pub switched: u64,
+    /// Edges that faces cross and that were switched off: of open sheets, which are closed onto themselves and vanish, all.
+    pub vanished: u64,
 }
 
 /// Switches edges until no face is odd, so that any input gets an inside.
@@ -61,10 +63,13 @@ pub fn close(crossings: Crossings, progress: &dyn Progress) -> Result<(Crossings
     let exits =
         odd.iter().zip(0..).map(number).flat_map(|(face, exit)| face.coboundary().map(move |cell| (cell, exit)));
     let (switches, rings) = fill(&crossings, exits.collect(), progress)?;
-    let toggles: Vec<Toggle> =
+    let mut toggles: Vec<Toggle> =
         switches.into_iter().map(|Switch { edge, sample, .. }| Toggle { edge, sample }).collect();
-    let mut closing = Closing { odd_faces: odd.len() as u64, rings, switched: 0 };
+    let mut closing = Closing { odd_faces: odd.len() as u64, rings, ..Closing::default() };
     closing.switched = toggles.len() as u64;
+    toggles.par_sort_unstable();
+    let once = toggles.par_chunk_by(|a, b| a.edge == b.edge).filter(|same| same.len() % 2 == 1);
+    closing.vanished = once.filter(|same| crossings.is_crossed(same[0].edge)).count() as u64;
     let crossings = crossings.toggled(toggles);
     debug_assert!(crossings.odd_faces().is_empty(), "filling all rings leaves no odd face");
     Ok((crossings, closing))

@@ -2,6 +2,7 @@
 
 use clap::builder::RangedI64ValueParser;
 use clap::value_parser;
+use zmend::Keep;
 use zmend::geom::frame::{DEPTHS, Frame};
 use zmend::mesh::{Bounds, sample};
 
@@ -18,6 +19,25 @@ pub(super) fn scale(text: &str) -> Result<f64, String> {
     let scale = text.parse().map_err(|_| "not a number".to_owned())?;
     let unit = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE };
     Frame::fit(&unit, *DEPTHS.start(), scale).map(|_| scale).map_err(|e| e.to_string())
+}
+
+/// A length in model units.
+pub(super) fn width(text: &str) -> Result<f64, String> {
+    let width = text.parse().map_err(|_| "not a number".to_owned())?;
+    if width > 0.0 && f64::is_finite(width) { Ok(width) } else { Err("not a width above 0".to_owned()) }
+}
+
+/// `all`, `largest`, a number of solids, or a ratio, which is written with a point.
+pub(super) fn keep(text: &str) -> Result<Keep, String> {
+    let keep = match text {
+        "all" => Keep::All,
+        "largest" => Keep::Largest,
+        _ => match text.parse() {
+            Ok(count) => Keep::Count(count),
+            Err(_) => Keep::Ratio(text.parse().map_err(|_| "not `all`, `largest`, a ratio or a number".to_owned())?),
+        },
+    };
+    keep.check().map(|()| keep).map_err(|e| e.to_string())
 }
 
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
@@ -48,6 +68,14 @@ mod tests {
         }
         assert_eq!(scale("0.5"), Ok(0.5));
         assert!(["0", "1", "-1", "nan", "inf", "x"].iter().all(|bad| scale(bad).is_err()));
+        assert_eq!(
+            (keep("1"), keep("1.0"), keep("0.25")),
+            (Ok(Keep::Count(1)), Ok(Keep::Ratio(1.0)), Ok(Keep::Ratio(0.25)))
+        );
+        assert_eq!((keep("all"), keep("largest")), (Ok(Keep::All), Ok(Keep::Largest)));
+        assert!(["0", "-1", "1.5", "nan", "most", ""].iter().all(|bad| keep(bad).is_err()));
+        assert_eq!(width("2.5"), Ok(2.5));
+        assert!(["0", "-1", "nan", "inf", "x"].iter().all(|bad| width(bad).is_err()));
         assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
     }
 }
