@@ -129,6 +129,16 @@ impl Plane {
         }
     }
 
+    /// The plane of the elements one step down along `axis`; `previous` is the brick there.
+    #[must_use]
+    pub fn at_minus(&self, axis: Axis, previous: &Plane) -> Plane {
+        match axis {
+            Axis::X => self.at_minus_x(previous),
+            Axis::Y => self.at_minus_y(previous),
+            Axis::Z => self.at_minus_z(previous),
+        }
+    }
+
     /// Whether a bit at the low side along `axis` is set.
     pub fn touches_min(&self, axis: Axis) -> bool {
         match axis {

@@ -27,6 +27,7 @@ mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub(crate) mod points;
 pub mod regions;
 pub mod segments;
 pub mod signed;
