@@ -11,7 +11,6 @@
 //! Cost: about 60 ns and 76/80 bytes a mixed cell beyond the octree (a plane and 12 bytes a brick); positions are not kept.
 
 use super::PIECE;
-use super::cells::{Cells, Crossing, EdgeTable};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
@@ -21,6 +20,7 @@ use crate::grid::cases::{CASES, Mask, inside_end};
 use crate::grid::{Axis, Corner, Edge, Face, Key};
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
+use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::{Brick, Crossings, position, toward};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};

@@ -20,6 +20,7 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+pub(crate) mod cells;
 pub mod crossings;
 mod locate;
 mod neighbour;
