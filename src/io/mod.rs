@@ -23,6 +23,7 @@ mod format;
 mod input;
 mod number;
 mod obj;
+mod octree;
 mod off;
 mod ply;
 mod stl;
@@ -32,6 +33,9 @@ mod write;
 pub use encode::Precision;
 pub use format::{Encoding, Format};
 pub use input::{Input, InputInfo, open};
+pub use octree::{
+    OctreeFile, OctreeFormat, OctreeInfo, read_octree, read_octree_bytes, write_dcf, write_sof, write_sog,
+};
 pub use write::{WriteOptions, Writer, create, write};
 
 use crate::error::{Error, Place, Result};

@@ -26,6 +26,7 @@ mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub mod points;
 pub mod segments;
 pub mod signed;
 mod traverse;
@@ -42,6 +43,7 @@ use crate::grid::key::MAX_LEVEL;
 
 pub use crossings::Crossings;
 pub use neighbour::Neighbours;
+pub use points::{CellPoints, StoredPoints};
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
 pub use validate::Violation;
