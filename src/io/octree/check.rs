@@ -31,16 +31,9 @@ enum Signs<'a> {
 }
 
 impl Decoded {
-    /// The points of a brick that are inside.
-    ///
-    /// # Panics
-    /// When the octree does not hold the brick.
-    pub(super) fn points(&self, brick: Key) -> Plane {
-        match self.signs(Some(brick)) {
-            Signs::Divided(divided) => divided.corners[0],
-            Signs::Uniform(is_inside) => plane_of(is_inside),
-            Signs::Beyond => Plane::EMPTY,
-        }
+    /// Whether a brick of one sign is inside.
+    pub(super) fn is_uniformly_inside(&self, brick: Key) -> bool {
+        self.uniform_around(brick).unwrap_or(false)
     }
 
     /// The first disagreement among divided bricks, else among cells of one sign.

@@ -37,10 +37,10 @@ impl Hermites {
         self.ends.push(self.samples.len());
     }
 
-    /// The samples of brick number `i`, in order.
-    pub(super) fn of_brick(&self, i: usize) -> Vec<Sample> {
+    /// Pushes the samples of brick number `i`, in order.
+    pub(super) fn of_brick(&self, i: usize, samples: &mut Vec<Sample>) {
         let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        self.samples.range(start..self.ends[i]).copied().collect()
+        samples.extend(self.samples.range(start..self.ends[i]))
     }
 }
 
@@ -61,12 +61,11 @@ fn straight(axis: Axis) -> u16 {
 /// A plane whose normal is nearer than this to a right angle with an edge (as sine) crosses it nowhere in particular.
 const PARALLEL: f64 = 1e-3;
 
-/// The samples of a brick's crossings from the points of the four cells around each: the edge is cut by the plane through their mean with
+/// Pushes the samples of a brick's crossings, from the points of the four cells around each: the edge is cut by the plane through their mean with
 /// the cross product of their diagonals as normal.
-pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided) -> Vec<Sample> {
+pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided, samples: &mut Vec<Sample>) {
     let origin = lattice_point(frame.depth(), brick.key);
     let home = points.of_brick(brick.key);
-    let mut samples = Vec::new();
     for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
         let others = axis.others();
         // The bricks at 0, -u, -v and -u - v.
@@ -97,7 +96,6 @@ pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided)
             });
         }
     }
-    samples
 }
 
 /// Where the edge along `axis` from the origin meets the plane of four points.

@@ -10,18 +10,16 @@ use super::sog::Sog;
 use super::{OctreeFile, OctreeFormat, OctreeInfo};
 use crate::error::{Error, Place, Result};
 use crate::geom::Frame;
+use crate::grid::Key;
+use crate::grid::brick::Plane;
 use crate::io::bytes::Bytes;
-use crate::octree::crossings::{Builder, Sample};
+use crate::octree::crossings::Sample;
 use crate::octree::{SignedOctree, StoredPoints};
-use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Silent};
 use glam::DVec3;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-
-/// Bricks whose samples are made at once.
-const PIECE: usize = 64;
 
 /// Reads an octree file. The content says the format, or the name where the content does not (SOF).
 ///
@@ -102,9 +100,9 @@ type Parts = (SignedOctree, Frame, Option<StoredPoints>);
 impl<R: Read> Reading<'_, R> {
     fn sof(&mut self) -> Result<Parts> {
         let (frame, decoded) = self.decoded::<Sof>(&mut |_, _, _| {})?;
-        let half_way = |_, brick: &Divided| {
+        let half_way = |_, brick: &Divided, samples: &mut Vec<Sample>| {
             let crossings = brick.crossed().iter().map(|plane| plane.count() as usize).sum();
-            vec![fill::HALF_WAY; crossings]
+            samples.resize(crossings, fill::HALF_WAY);
         };
         Ok((self.octree(&decoded, false, half_way)?, frame, None))
     }
@@ -115,7 +113,8 @@ impl<R: Read> Reading<'_, R> {
             let points_of_brick: Vec<[f32; 3]> = leaves.iter().map(|cell| data[cell.index() as usize]).collect();
             points.push(brick.key, *leaves, &points_of_brick);
         })?;
-        let octree = self.octree(&decoded, true, |_, brick| fill::from_points(&points, &frame, brick))?;
+        let octree =
+            self.octree(&decoded, true, |_, brick, samples| fill::from_points(&points, &frame, brick, samples))?;
         Ok((octree, frame, Some(points)))
     }
 
@@ -123,13 +122,13 @@ impl<R: Read> Reading<'_, R> {
         let mut hermites = Hermites::default();
         let (frame, decoded) = self.decoded::<Dcf>(&mut |brick, leaves, data| hermites.push(brick, leaves, data))?;
         self.info.missing_samples = hermites.missing;
-        Ok((self.octree(&decoded, true, |i, _| hermites.of_brick(i))?, frame, None))
+        Ok((self.octree(&decoded, true, |i, _, samples| hermites.of_brick(i, samples))?, frame, None))
     }
 
     /// Reads header and nodes, and makes sure that the signs make sense.
     fn decoded<D: Dialect>(
         &mut self,
-        keep: &mut dyn FnMut(&Divided, &crate::grid::brick::Plane, &[D::Leaf; 512]),
+        keep: &mut dyn FnMut(&Divided, &Plane, &[D::Leaf; 512]),
     ) -> Result<(Frame, Decoded)> {
         let header = D::read_header(&mut self.bytes)?;
         let frame = self.frame(header)?;
@@ -157,37 +156,21 @@ impl<R: Read> Reading<'_, R> {
         frame.map_err(|e| Error::format(self.name, Place::Whole, format!("the cube of the octree: {e}"), ""))
     }
 
-    /// Puts the octree together; `samples` makes those of the crossings of brick number i, in order.
+    /// Puts the octree together; `samples` pushes those of the crossings of brick number i, in order.
     fn octree(
         &self,
         decoded: &Decoded,
         with_normals: bool,
-        samples: impl Fn(usize, &Divided) -> Vec<Sample> + Sync,
+        samples: impl Fn(usize, &Divided, &mut Vec<Sample>) + Sync,
     ) -> Result<SignedOctree> {
         let crossings = |brick: &Divided| brick.crossed().iter().map(|plane| u64::from(plane.count())).sum::<u64>();
         if decoded.bricks.iter().map(crossings).sum::<u64>() > u64::from(u32::MAX) {
             let problem = "the surface crosses more than 2^32 - 1 edges of the grid";
             return Err(Error::format(self.name, Place::Whole, problem, "take an octree of smaller depth"));
         }
-        let mut builder = Builder::new(decoded.depth, with_normals);
-        let (count, piece) = pieces(decoded.bricks.len(), PIECE);
-        in_order(
-            count,
-            self.progress,
-            || (),
-            |(), n| piece(n).map(|i| (i, samples(i, &decoded.bricks[i]))).collect::<Vec<_>>(),
-            |of_bricks| {
-                for (i, samples) in of_bricks {
-                    let brick = &decoded.bricks[i];
-                    let offsets: Vec<u16> = samples.iter().map(|sample| sample.offset).collect();
-                    let normals: Vec<u16> = samples.iter().map(|sample| sample.normal).collect();
-                    builder.push(brick.key, brick.crossed(), &offsets, &normals);
-                }
-                Ok(())
-            },
-        )?;
-        let crossings = builder.finish();
-        let inside = crossings.bricks().iter().map(|brick| decoded.points(brick.key)).collect();
-        Ok(SignedOctree::new(crossings, inside))
+        let signs: Vec<(Key, Plane)> = decoded.bricks.iter().map(|brick| (brick.key, brick.corners[0])).collect();
+        let is_inside = |brick| decoded.is_uniformly_inside(brick);
+        let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| samples(i, &decoded.bricks[i], list);
+        Ok(SignedOctree::from_signs(decoded.depth, with_normals, &signs, is_inside, samples))
     }
 }
