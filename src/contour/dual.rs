@@ -363,7 +363,7 @@ const CREASED: f32 = 0.933;
 
 /// The tangent planes at the crossings round the cells of a brick, in cells from its least corner, and what they add up to for
 /// each cell.
-struct Planes {
+pub(super) struct Planes {
     /// Point and outward unit normal of each crossing.
     tangents: EdgeTable<(Vec3A, Vec3A)>,
     /// For each cell, and those round the brick, whose sums are never read. Cells without crossings have empty sums.
@@ -381,7 +381,7 @@ const ROUND_EDGE: [[usize; 4]; 3] = {
 };
 
 impl Planes {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Planes { tangents: EdgeTable::new((Vec3A::ZERO, Vec3A::ZERO)), sums: Box::new([Qef::EMPTY; SUM_SIDE.pow(3)]) }
     }
 
@@ -410,6 +410,20 @@ impl Planes {
     /// The sum for a cell, which is empty from then on.
     fn take_sum(&mut self, cell: Local) -> Qef {
         std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
+    }
+
+    /// Calls `place` with one position for each mixed cell of a brick, however many sheets it has, in cells from the least corner of the
+    /// brick.
+    pub(super) fn place_cells(
+        &mut self,
+        octree: &SignedOctree,
+        brick: usize,
+        placement: Placement,
+        mut place: impl FnMut(Vec3A),
+    ) {
+        let cells = Cells::new(octree, brick);
+        self.fill(&cells, octree.crossings(), placement);
+        cells.mixed().iter().for_each(|cell| _ = self.place_ordinary(cell, placement, &mut place));
     }
 
     /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick. Returns whether the cell has

@@ -6,12 +6,14 @@
 
 mod cubes;
 mod dual;
+mod points;
 
 pub use cubes::marching_cubes;
 /// Bricks of a piece: some five thousand cells, whose points and faces stay in the cache until they are taken.
 const PIECE: usize = 64;
 
 pub use dual::{DualOptions, Placement, dual_contouring};
+pub use points::CellVertices;
 
 #[cfg(test)]
 mod tests {
