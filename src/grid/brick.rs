@@ -63,7 +63,7 @@ impl Plane {
 
     /// The positions of a cube of `side` (1, 2, 4 or 8) whose least one is `at`, which is a multiple of the side on every axis.
     pub const fn cube(at: Local, side: u32) -> Plane {
-        debug_assert!(at.0 as u32 & 0o111 * (side - 1) == 0, "cubes of the octree lie at multiples of their side");
+        debug_assert!(at.0 as u32 & (0o111 * (side - 1)) == 0, "cubes of the octree lie at multiples of their side");
         let row = (1u64 << side) - 1;
         let square = row * (Z0 & (!0 >> (64 - 8 * side)));
         let [x, y, z] = at.coords();

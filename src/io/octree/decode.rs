@@ -49,8 +49,8 @@ impl Divided {
     }
 }
 
-/// Leaves of the brick that is being read, to be taken when it is complete.
-type Keep<'a, L> = dyn FnMut(&Divided, &Plane, &[L; 512]) + 'a;
+/// Takes a brick that is complete, with its leaves and what they say.
+pub(super) type Keep<'a, L> = dyn FnMut(&Divided, &Plane, &[L; 512]) + 'a;
 
 /// Reads all nodes. Passes each brick with both signs to `keep`, with its leaves and what they say.
 pub(super) fn decode<D: Dialect, R: Read>(
@@ -76,7 +76,7 @@ pub(super) fn decode<D: Dialect, R: Read>(
     let mut nodes = 0u64;
     while let Some(cell) = next {
         nodes += 1;
-        if nodes % OFTEN == 0 {
+        if nodes.is_multiple_of(OFTEN) {
             check(progress)?;
             progress.advance(bytes.position() - told);
             told = bytes.position();
@@ -106,9 +106,9 @@ pub(super) fn decode<D: Dialect, R: Read>(
                     _ => {}
                 }
                 if is_finest {
-                    decoder.leaf(cell, !outside, data)
+                    decoder.leaf(cell, !outside, data);
                 } else {
-                    decoder.empty(cell, outside == 0)
+                    decoder.empty(cell, outside == 0);
                 }
                 after(cell, root)
             }

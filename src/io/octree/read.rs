@@ -2,7 +2,7 @@
 
 use super::check::Disagreement;
 use super::dcf::Dcf;
-use super::decode::{Decoded, Divided, decode};
+use super::decode::{Decoded, Divided, Keep, decode};
 use super::dialect::{Dialect, Header};
 use super::fill::{self, Hermites};
 use super::sof::Sof;
@@ -126,10 +126,7 @@ impl<R: Read> Reading<'_, R> {
     }
 
     /// Reads header and nodes, and makes sure that the signs make sense.
-    fn decoded<D: Dialect>(
-        &mut self,
-        keep: &mut dyn FnMut(&Divided, &Plane, &[D::Leaf; 512]),
-    ) -> Result<(Frame, Decoded)> {
+    fn decoded<D: Dialect>(&mut self, keep: &mut Keep<'_, D::Leaf>) -> Result<(Frame, Decoded)> {
         let header = D::read_header(&mut self.bytes)?;
         let frame = self.frame(header)?;
         let decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;

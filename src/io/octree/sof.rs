@@ -30,7 +30,7 @@ impl Dialect for Sof {
     }
 
     fn write_node(node: Node<&()>, out: &mut Vec<u8>) {
-        write_node(node, out);
+        write_node(&node, out);
     }
 }
 
@@ -51,8 +51,8 @@ pub(super) fn read_node<L, R: Read>(
 }
 
 /// Appends a node as SOF and SOG have it, without what stands behind the signs of a leaf.
-pub(super) fn write_node<L>(node: Node<L>, out: &mut Vec<u8>) {
-    match node {
+pub(super) fn write_node<L>(node: &Node<L>, out: &mut Vec<u8>) {
+    match *node {
         Node::Inner => out.push(0),
         Node::Empty { is_outside } => out.extend([1, u8::from(is_outside)]),
         Node::Leaf { outside, .. } => out.extend([2, outside]),

@@ -60,7 +60,7 @@ impl Dialect for Sog {
     }
 
     fn write_node(node: Node<&[f32; 3]>, out: &mut Vec<u8>) {
-        sof::write_node(node, out);
+        sof::write_node(&node, out);
         if let Node::Leaf { data, .. } = node {
             put_vector(*data, out);
         }
