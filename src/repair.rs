@@ -1,6 +1,6 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
-use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
+use crate::contour::{DualOptions, Intersections, Placement, dual_contouring, marching_cubes};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
@@ -22,11 +22,20 @@ pub struct Options {
     pub surface: Surface,
     /// What the faces are. Default [`Faces::Auto`].
     pub faces: Faces,
+    /// Whether faces must not pass through each other: see [`Intersections`]. Marching cubes and blocks have no such faces in any case,
+    /// whatever this says. Default false.
+    pub no_self_intersections: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { depth: 8, scale: 0.9, surface: Surface::default(), faces: Faces::default() }
+        Options {
+            depth: 8,
+            scale: 0.9,
+            surface: Surface::default(),
+            faces: Faces::default(),
+            no_self_intersections: false,
+        }
     }
 }
 
@@ -40,12 +49,14 @@ pub enum Surface {
     DualContouring,
     /// Dual contouring with points at the mean of the crossings: smooth quadrilaterals, no sharp edges.
     Quads,
+    /// Squares of one cell, as if the solid were built of blocks.
+    Blocks,
 }
 
 /// What the faces of a surface are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Faces {
-    /// Polygons for [`Surface::Quads`], triangles for the others.
+    /// Polygons for [`Surface::Quads`] and [`Surface::Blocks`], triangles for the others.
     #[default]
     Auto,
     /// Triangles; quadrilaterals of dual surfaces are cut along creases.
@@ -219,13 +230,15 @@ fn extract(
         Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
         Surface::DualContouring => Placement::SharpFeatures,
         Surface::Quads => Placement::MassPoint,
+        Surface::Blocks => Placement::Centre,
     };
+    let intersections = if options.no_self_intersections { Intersections::Avoid } else { Intersections::Allow };
     let triangles = match options.faces {
-        Faces::Auto => options.surface != Surface::Quads,
+        Faces::Auto => options.surface == Surface::DualContouring,
         Faces::Triangles => true,
         Faces::Polygons => false,
     };
-    dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
+    dual_contouring(octree, frame, &DualOptions { placement, triangles, intersections }, sink, progress)
 }
 
 /// An input without faces gets the unit cube: all checks of options apply, and the result is empty.
