@@ -1,6 +1,7 @@
 //! One point a cell, as SOG files have them, where dual contouring has one a sheet.
 
-use super::dual::{Placement, Planes};
+use super::dual::Placement;
+use super::place::Planes;
 use crate::geom::Frame;
 use crate::octree::{CellPoints, SignedOctree};
 use glam::DVec3;
@@ -12,12 +13,12 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy)]
 pub struct CellVertices {
     frame: Frame,
-    placement: Placement,
+    placement: Placement<'static>,
 }
 
 impl CellVertices {
     /// Points in model units for the grid of `frame`.
-    pub fn new(frame: Frame, placement: Placement) -> Self {
+    pub fn new(frame: Frame, placement: Placement<'static>) -> Self {
         CellVertices { frame, placement }
     }
 }

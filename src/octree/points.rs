@@ -16,13 +16,13 @@ pub trait CellPoints: Sync {
 }
 
 /// Points of cells, held in memory.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct StoredPoints {
     bricks: Vec<StoredBrick>,
     points: Segments<[f32; 3], 12>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 struct StoredBrick {
     key: Key,
     /// The cells that have a point.
