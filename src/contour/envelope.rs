@@ -109,10 +109,16 @@ mod tests {
             safe_diagonals(u, v, Vec4::from_array(heights))
         };
         assert_eq!(at([0.5; 4]), Safe { first: true, second: true });
-        // A saddle whose planes leave the edge on one side or the other: two corners high, two low.
-        let u = Vec4::new(-0.1, 0.9, 0.1, -0.9);
-        let v = Vec4::new(-0.1, -0.9, 0.1, 0.9);
-        let safe = safe_diagonals(u, v, Vec4::new(0.9, 0.1, 0.9, 0.1));
-        assert_eq!(safe, Safe { first: true, second: false });
+        // The plane of vertices 0, 1 and 2 rises beyond the end of the edge.
+        let u = Vec4::new(-0.1, 0.9, 0.9, -0.9);
+        let v = Vec4::new(-0.9, -0.9, 0.1, 0.9);
+        assert_eq!(safe_diagonals(u, v, Vec4::new(0.9, 0.1, 0.9, 0.9)), Safe { first: false, second: true });
+        // Vertex 2 lies behind the line from 1 to 3: only the diagonal to it is inside.
+        let v = Vec4::new(-0.9, -0.9, 0.1, 0.1);
+        let u = Vec4::new(-0.9, 0.9, 0.01, -0.9);
+        assert_eq!(
+            safe_diagonals(u, v - Vec4::new(0.0, 0.0, 0.09, 0.0), Vec4::splat(0.5)),
+            Safe { first: true, second: false }
+        );
     }
 }
