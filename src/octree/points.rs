@@ -81,7 +81,7 @@ impl PointsOfBrick<'_> {
     }
 }
 
-impl CellPoints for StoredPoints {
+impl CellPoints for &StoredPoints {
     /// # Panics
     /// When a mixed cell has no point, as when the points are those of another octree.
     fn of_bricks(&self, octree: &SignedOctree, bricks: &[u32], points: &mut Vec<[f32; 3]>) {
