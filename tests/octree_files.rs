@@ -12,7 +12,7 @@ use zmend::mesh::{Mesh, TriangleSource, sample};
 use zmend::octree::crossings::{Sample, lattice_point};
 use zmend::octree::{CellPoints, SignedOctree};
 use zmend::progress::Silent;
-use zmend::sign;
+use zmend::{Faces, Options, Solid, Surface, sign, solidify};
 
 const FORMATS: [OctreeFormat; 3] = [OctreeFormat::Sof, OctreeFormat::Sog, OctreeFormat::Dcf];
 
@@ -290,6 +290,55 @@ fn points_give_back_the_surface() {
     let mean = errors.clone().sum::<f64>() / a.len() as f64;
     let large = errors.filter(|&e| e > 0.25).count();
     assert!(mean < 0.05 && large * 50 < a.len(), "mean {mean}, {large} of {} are off by more than a quarter", a.len());
+}
+
+/// What the file of a solid gives as dual surface is what the solid itself gives, rounded to 32 bits, but for the few cells with several
+/// sheets: the file has one point for all of them.
+#[test]
+fn dual_surfaces_come_back() {
+    for (name, surface) in [("gear", Surface::DualContouring), ("knot-holes", Surface::Quads)] {
+        let options = Options { depth: 6, surface, faces: Faces::Polygons, ..Options::default() };
+        let mut mesh = sample::build(name, 1).expect("a sample");
+        let with_normals = Options { surface: Surface::DualContouring, ..options };
+        let (solid, _) = solidify(&mut mesh, &with_normals, &Silent).expect("repairable");
+        let points = solid.cell_points(surface).expect("there are normals");
+        let bytes = written(&solid.octree, &solid.frame, Some(points.as_ref()), OctreeFormat::Sog);
+        let file = read_octree_bytes(name, &bytes, None).expect("ours");
+        let read = Solid { octree: file.octree, frame: file.frame, points: file.points };
+        let extracted = |solid: &Solid, surface| {
+            let mut mesh = Mesh::default();
+            solid.extract(&Options { surface, ..options }, &mut mesh, &Silent).expect("memory");
+            assert_eq!(mesh.validate(), Ok(()));
+            mesh
+        };
+        // Dual contouring takes the points of the file, whatever they are.
+        let (direct, again) = (extracted(&solid, surface), extracted(&read, Surface::DualContouring));
+        assert_eq!((direct.points.len(), direct.faces.len()), (again.points.len(), again.faces.len()));
+        let cell = solid.frame.cell_size();
+        let differ = direct.points.iter().zip(&again.points).filter(|(a, b)| a.distance(**b) > 1e-4 * cell).count();
+        assert!(differ * 200 < direct.points.len(), "{name}: {differ} of {} points differ", direct.points.len());
+        assert!(extracted(&read, Surface::MarchingCubes).report().volume > 0.0);
+        let options = Options { no_self_intersections: true, ..options };
+        let mut disjoint = Mesh::default();
+        read.extract(&options, &mut disjoint, &Silent).expect("memory");
+        assert_eq!(disjoint.validate(), Ok(()));
+    }
+}
+
+#[test]
+fn surfaces_that_need_normals_need_them() {
+    let solid = Solid { octree: octree(3, false, |p| p == [4, 4, 4]), frame: unit(3), points: None };
+    let mut mesh = Mesh::default();
+    let sharp = Options { surface: Surface::DualContouring, ..Options::default() };
+    assert!(solid.extract(&sharp, &mut mesh, &Silent).expect_err("no normals").to_string().contains("take mc"));
+    assert!(solid.cell_points(Surface::MarchingCubes).is_err() && solid.cell_points(Surface::Blocks).is_ok());
+    let path = tempfile::tempdir().expect("a directory").path().join("x.dcf");
+    assert!(io::write_dcf(path, &solid.octree, &Silent).expect_err("no normals").to_string().contains("SOF"));
+    for surface in [Surface::MarchingCubes, Surface::Quads, Surface::Blocks] {
+        let mut mesh = Mesh::default();
+        solid.extract(&Options { surface, ..sharp }, &mut mesh, &Silent).expect("memory");
+        assert_eq!((mesh.validate(), mesh.report().genus), (Ok(()), Some(0)));
+    }
 }
 
 #[test]

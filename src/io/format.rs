@@ -52,6 +52,11 @@ impl Format {
         }
     }
 
+    /// Whether faces of more than three corners are cut when they are written.
+    pub fn has_only_triangles(self) -> bool {
+        self == Format::Stl
+    }
+
     /// The format of a file of `len` bytes that begins with `prefix`: what the content says for sure, else `hint`, else
     /// what the content looks like.
     pub(super) fn detect(name: &str, prefix: &[u8], len: u64, hint: Option<Format>) -> Result<Format> {

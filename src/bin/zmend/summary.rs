@@ -136,7 +136,7 @@ impl Summary<'_> {
     }
 }
 
-fn surface_name(surface: Surface) -> &'static str {
+pub(crate) fn surface_name(surface: Surface) -> &'static str {
     match surface {
         Surface::MarchingCubes => "mc",
         Surface::DualContouring => "dc",
