@@ -81,7 +81,13 @@ impl PointsOfBrick<'_> {
     }
 }
 
-impl CellPoints for &StoredPoints {
+impl<P: CellPoints> CellPoints for &P {
+    fn of_bricks(&self, octree: &SignedOctree, bricks: &[u32], points: &mut Vec<[f32; 3]>) {
+        (**self).of_bricks(octree, bricks, points);
+    }
+}
+
+impl CellPoints for StoredPoints {
     /// # Panics
     /// When a mixed cell has no point, as when the points are those of another octree.
     fn of_bricks(&self, octree: &SignedOctree, bricks: &[u32], points: &mut Vec<[f32; 3]>) {
