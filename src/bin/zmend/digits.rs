@@ -32,13 +32,14 @@ pub(crate) fn of_frame(frame: &Frame, format: Format, is_text: bool) -> Result<(
 }
 
 fn chosen(need: Need, far: f64, format: Format, is_text: bool) -> Result<(Precision, bool)> {
-    let is_single = format == Format::Stl && !is_text;
+    let is_single = format.is_single(is_text);
     match need {
         Need::Single => Ok((Precision::Single, false)),
         Need::Digits if is_single => Ok((Precision::Single, true)),
         Need::Range if is_single => {
-            let problem = format!("binary STL cannot hold numbers such as {far:e}");
-            Err(Error::setting("format", problem, "write PLY, or text with --ascii"))
+            let kind = if format == Format::Stl { "binary STL".to_owned() } else { format.to_string() };
+            let problem = format!("{kind} cannot hold numbers such as {far:e}");
+            Err(Error::setting("format", problem, "write PLY, or STL as text with --ascii"))
         }
         Need::Digits | Need::Range => Ok((Precision::Double, false)),
     }

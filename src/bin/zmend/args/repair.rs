@@ -28,7 +28,7 @@ pub(crate) struct RepairArgs {
     /// Mesh to repair, or an octree to make a surface of (.sof, .sog, .dcf), which has a grid of its own.
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
-    /// File to write: .stl, .ply, .obj or .off; or the octree alone, as .sof, .sog or .dcf.
+    /// File to write: .stl, .ply, .obj, .off, .glb or .3mf; or the octree alone, as .sof, .sog or .dcf.
     #[arg(value_name = "OUT")]
     out: Option<PathBuf>,
     /// The same as OUT.
@@ -168,6 +168,9 @@ pub(crate) enum FormatArg {
     Ply,
     Obj,
     Off,
+    Glb,
+    #[value(name = "3mf")]
+    ThreeMf,
     Sof,
     Sog,
     Dcf,
@@ -180,6 +183,8 @@ impl From<FormatArg> for GoalFormat {
             FormatArg::Ply => GoalFormat::Mesh(Format::Ply),
             FormatArg::Obj => GoalFormat::Mesh(Format::Obj),
             FormatArg::Off => GoalFormat::Mesh(Format::Off),
+            FormatArg::Glb => GoalFormat::Mesh(Format::Glb),
+            FormatArg::ThreeMf => GoalFormat::Mesh(Format::ThreeMf),
             FormatArg::Sof => GoalFormat::Octree(OctreeFormat::Sof),
             FormatArg::Sog => GoalFormat::Octree(OctreeFormat::Sog),
             FormatArg::Dcf => GoalFormat::Octree(OctreeFormat::Dcf),
