@@ -69,6 +69,18 @@ impl Error {
     }
 }
 
+/// A measured number in a message: six digits at most, and no row of zeros for those that are huge or tiny.
+pub(crate) struct Short(pub(crate) f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Rounded to six digits by writing and reading, then written in the shortest way.
+        let rounded: f64 = format!("{:.5e}", self.0).parse().unwrap_or(self.0);
+        let is_plain = rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) || !rounded.is_finite();
+        if is_plain { write!(f, "{rounded}") } else { write!(f, "{rounded:e}") }
+    }
+}
+
 /// A place in an input file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
@@ -109,5 +121,12 @@ mod tests {
         assert_eq!(e.to_string(), "part.ply: line 1203: face 88 refers to vertex 9001, but there are 9000");
         let e = Error::setting("scale", "1.5 is not below 1", "take 0.9");
         assert_eq!(e.to_string(), "scale: 1.5 is not below 1; take 0.9");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let shown = [0.0, -0.1, 1.0 / 3.0, 1_234_567.8, 1e300 / 0.9, 5e-324, f64::NAN, f64::INFINITY].map(Short);
+        let expected = ["0", "-0.1", "0.333333", "1234570", "1.11111e300", "5e-324", "NaN", "inf"];
+        assert_eq!(shown.map(|x| x.to_string()), expected);
     }
 }

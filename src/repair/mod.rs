@@ -9,7 +9,7 @@ pub use report::{RepairReport, Warning};
 use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
 use crate::error::Result;
 use crate::geom::Frame;
-use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
+use crate::mesh::{Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
 use crate::sign::{close, parity_signs, scan};
@@ -63,7 +63,7 @@ pub fn repair_into(
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let frame = Frame::fit(&nonempty(bounds), options.depth, options.scale)?;
+    let frame = options.frame(&bounds)?;
     let scanned = clock.time(Stage::Scan, || scan(source, &frame, options.surface.needs_normals(), progress))?;
     let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
     let octree = clock.time(Stage::Sign, || {
@@ -116,9 +116,4 @@ fn extract(
         Faces::Polygons => false,
     };
     dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
-}
-
-/// An input without faces gets the unit cube: all checks of options apply, and the result is empty.
-fn nonempty(bounds: Bounds) -> Bounds {
-    if bounds.is_empty() { Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE } } else { bounds }
 }

@@ -1,6 +1,5 @@
 //! How many digits written coordinates need.
 
-use zmend::geom::Frame;
 use zmend::io::{Format, Precision};
 use zmend::mesh::Bounds;
 use zmend::{Error, Options, Result};
@@ -37,7 +36,7 @@ fn need(bounds: &Bounds, options: &Options) -> Result<Need> {
     if bounds.is_empty() {
         return Ok(Need::Single);
     }
-    let cell = Frame::fit(bounds, options.depth, options.scale)?.cell_size();
+    let cell = options.frame(bounds)?.cell_size();
     let far = farthest(bounds) + cell;
     Ok(if far > f64::from(f32::MAX) || cell / STEPS < f64::from(f32::MIN_POSITIVE) {
         Need::Range

@@ -24,10 +24,13 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     goal::check(goal, &[&args.input], args.write.force)?;
     let options = Options {
         depth: args.grid.depth,
+        cell: args.grid.cell,
         scale: args.grid.scale,
+        cube: args.grid.cube(),
         surface: args.surface.kind.into(),
         // STL has nothing else, and the surface knows better than the writer which diagonals to take.
         faces: if format == Format::Stl { Faces::Triangles } else { args.surface.faces.into() },
+        max_memory: None,
     };
 
     let bars = Bars::new(!args.tell.quiet && !args.tell.json);

@@ -29,7 +29,7 @@ pub(crate) struct Summary<'a> {
 
 impl Summary<'_> {
     pub(crate) fn print(&self) -> Result<()> {
-        let cells = 1u64 << self.options.depth;
+        let cells = 1u64 << self.report.frame.depth();
         let cell = units::real(self.report.frame.cell_size());
         let mut table = Table::default();
         table.line("", &["before", "after"].map(|s| Some(s.to_owned())));
@@ -66,8 +66,11 @@ impl Summary<'_> {
             "input": json::merged(json::side(&self.before), json::file(self.input)),
             "output": json::merged(json::side(&self.after), output),
             "options": {
-                "depth": self.options.depth,
+                "depth": frame.depth(),
+                "cell": self.options.cell,
                 "scale": self.options.scale,
+                "box": self.options.cube.map(|cube| json!({ "min": json::vector(cube.min), "size": cube.size })),
+                "max_memory": self.options.max_memory,
                 "surface": surface_name(self.options.surface),
                 "faces": format!("{:?}", self.options.faces).to_lowercase(),
                 "threads": rayon::current_num_threads(),
