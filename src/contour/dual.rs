@@ -12,7 +12,7 @@
 
 use super::PIECE;
 use super::cells::{Cells, Crossing, EdgeTable};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
 use crate::geom::qef::Qef;
@@ -51,7 +51,7 @@ pub struct DualOptions {
 /// Quadrilaterals begin with a corner of the diagonal by which they are best split.
 ///
 /// # Errors
-/// Whatever `sink` returns, and `Cancelled`.
+/// Whatever `sink` returns, `Cancelled`, `Memory` when `progress` says so, and when there are more than 2^32 vertices.
 ///
 /// # Panics
 /// When sharp features are asked for and the octree has no normals.
@@ -69,7 +69,8 @@ pub fn dual_contouring(
     );
     let bricks = crossings.bricks().len();
     progress.begin(Stage::Contour, 2 * bricks as u64);
-    let layout = Layout::new(octree);
+    progress.hold((octree.bytes() + bricks * BRICK_BYTES) as u64)?;
+    let layout = Layout::new(octree)?;
     let polygons = layout.extra_polygons();
     let (quads, extra_corners) = (crossings.len() as u64, polygons.iter().map(|p| p.1.len() as u64).sum::<u64>());
     let sizes = if options.triangles {
@@ -105,6 +106,9 @@ pub fn dual_contouring(
     Ok(sizes)
 }
 
+/// The most bytes beyond the octree for each brick: what is found of it and where its vertices are; later that and its creases.
+const BRICK_BYTES: usize = size_of::<(Plane, Vec<Knot>)>() + size_of::<CellBrick>();
+
 /// A mixed cell whose vertices are not the ordinary single one.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
@@ -129,7 +133,7 @@ struct CellBrick {
 }
 
 impl<'a> Layout<'a> {
-    fn new(octree: &'a SignedOctree) -> Self {
+    fn new(octree: &'a SignedOctree) -> Result<Self> {
         let found: Vec<(Plane, Vec<Knot>)> = (0..octree.crossings().bricks().len())
             .into_par_iter()
             .map(|i| {
@@ -141,13 +145,18 @@ impl<'a> Layout<'a> {
             .collect();
         let mut layout = Layout { octree, bricks: Vec::with_capacity(found.len()), knots: Vec::new(), vertices: 0 };
         for (mixed, knots) in found {
-            let first = u32::try_from(layout.vertices).expect("fewer than 2^32 vertices");
+            let first = layout.vertices;
             layout.vertices +=
                 u64::from(mixed.count()) + knots.iter().map(|k| u64::from(k.extra_vertices())).sum::<u64>();
-            layout.bricks.push(CellBrick { mixed, first, knots: layout.knots.len() as u32 });
+            if u32::try_from(layout.vertices).is_err() {
+                let problem =
+                    format!("the surface has {} vertices or more; {} can be numbered", layout.vertices, u32::MAX);
+                return Err(Error::setting("depth", problem, "take a smaller depth"));
+            }
+            layout.bricks.push(CellBrick { mixed, first: first as u32, knots: layout.knots.len() as u32 });
             layout.knots.extend(knots);
         }
-        layout
+        Ok(layout)
     }
 
     fn knots_of(&self, brick: usize) -> &[Knot] {

@@ -66,6 +66,16 @@ impl<T, const BITS: u32> Segments<T, BITS> {
     }
 }
 
+/// The elements in order; each segment is given back as soon as it is used up.
+impl<T, const BITS: u32> IntoIterator for Segments<T, BITS> {
+    type Item = T;
+    type IntoIter = std::iter::Flatten<std::vec::IntoIter<Vec<T>>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.segments.into_iter().flatten()
+    }
+}
+
 impl<T: Copy, const BITS: u32> Segments<T, BITS> {
     /// Appends elements.
     pub fn extend_from_slice(&mut self, mut elements: &[T]) {
@@ -113,5 +123,6 @@ mod tests {
         list[77] = 5;
         assert_eq!((list[77], list[78]), (5, 78));
         assert!(list.allocated_bytes() >= 4000);
+        assert!(list.into_iter().skip(78).eq(plain[78..].iter().copied()));
     }
 }

@@ -1,5 +1,6 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod memory;
 mod options;
 mod report;
 
@@ -9,10 +10,11 @@ pub use report::{RepairReport, Warning};
 use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
 use crate::error::Result;
 use crate::geom::Frame;
-use crate::mesh::{Mesh, MeshSink, MeshSizes, TriangleSource};
+use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
 use crate::sign::{close, parity_signs, scan};
+use memory::{Guard, GuardedSink};
 use report::Clock;
 
 /// A repaired mesh and how it came about.
@@ -46,10 +48,12 @@ pub fn repair(mut mesh: Mesh, options: &Options) -> Result<Repaired> {
 
 /// Repairs whatever `source` yields and passes the result to `sink` as it is made: neither mesh need be in memory.
 ///
-/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)).
+/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)), and what the
+/// sink holds.
 ///
 /// # Errors
-/// When an option is out of range, when source or sink fail, and `Cancelled`.
+/// When an option is out of range, when the input does not fit into the given cube or needs more memory than may be taken, when source or
+/// sink fail, and `Cancelled`.
 pub fn repair_into(
     source: &mut dyn TriangleSource,
     options: &Options,
@@ -59,11 +63,29 @@ pub fn repair_into(
     let mut clock = Clock::default();
     progress.begin(Stage::Read, 0);
     let bounds = clock.time(Stage::Read, || source.bounds())?;
+    let frame = options.frame(&bounds)?;
+    let guard = Guard::new(progress, options);
+    let mut guarded = GuardedSink { sink, guard: &guard };
+    let report = guard
+        .check_source(source, &frame)
+        .and_then(|()| mend(source, bounds, frame, options, &mut guarded, &guard, clock));
+    report.map_err(|error| guard.explain(error, source, sink, &frame, options))
+}
+
+/// The stages after reading.
+fn mend(
+    source: &mut dyn TriangleSource,
+    bounds: Bounds,
+    frame: Frame,
+    options: &Options,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+    mut clock: Clock,
+) -> Result<RepairReport> {
     let mut warnings = Vec::new();
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let frame = options.frame(&bounds)?;
     let scanned = clock.time(Stage::Scan, || scan(source, &frame, options.surface.needs_normals(), progress))?;
     let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
     let octree = clock.time(Stage::Sign, || {
@@ -77,7 +99,8 @@ pub fn repair_into(
         warnings.push(Warning::NothingEnclosed);
     }
     let noted = [
-        (counts.skipped_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.skipped_triangles - counts.outside_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.outside_triangles, Warning::OutsideTriangles),
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
     ];
@@ -105,6 +128,7 @@ fn extract(
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
+    progress.hold(octree.bytes() as u64)?;
     let placement = match options.surface {
         Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
         Surface::DualContouring => Placement::SharpFeatures,
