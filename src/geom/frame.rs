@@ -108,7 +108,7 @@ impl Frame {
         let (low, high) = (self.origin - bounds.min, bounds.max - (self.origin + self.size));
         let is_low = low.max_element() >= high.max_element();
         let beyond = if is_low { low } else { high };
-        let axis = (0..3).max_by(|&a, &b| beyond[a].total_cmp(&beyond[b])).expect("three axes");
+        let axis = (0..3).rev().max_by(|&a, &b| beyond[a].total_cmp(&beyond[b])).expect("three axes");
         let name = ["x", "y", "z"][axis];
         let how =
             if beyond[axis] > 0.0 { format!("is {} units beyond", Short(beyond[axis])) } else { "touches".to_owned() };

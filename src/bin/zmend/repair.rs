@@ -4,7 +4,7 @@ use crate::args::{RepairArgs, ReportArg};
 use crate::bars::Bars;
 use crate::measure::{Measured, Side};
 use crate::summary::Summary;
-use crate::{digits, goal};
+use crate::{digits, goal, interrupt, memory};
 use glam::DVec3;
 use std::iter;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let goal = args.goal();
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[&args.input], args.write.force)?;
-    let options = Options {
+    let mut options = Options {
         depth: args.grid.depth,
         cell: args.grid.cell,
         scale: args.grid.scale,
@@ -41,18 +41,21 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let (precision, loses_digits) = digits::choose(&input.bounds, &options, format, is_text)?;
     let read = start.elapsed();
     let write_options = WriteOptions { precision, is_text, ..WriteOptions::default() };
-    let mut writer = io::create(goal, format, write_options)?;
-    let report = repair_into(&mut input, &options, &mut writer, &bars)?;
-    let repaired = start.elapsed();
-    bars.begin(Stage::Write, 0);
-    let bytes = writer.finish()?;
+    options.max_memory = memory::limit(args.grid.max_memory)?;
+    let (report, repaired, bytes) = interrupt::noted(|| {
+        let mut writer = io::create(goal, format, write_options)?;
+        let report = repair_into(&mut input, &options, &mut writer, &bars)?;
+        let repaired = start.elapsed();
+        bars.begin(Stage::Write, 0);
+        Ok((report, repaired, writer.finish()?))
+    })?;
     let total = start.elapsed();
     if args.tell.quiet {
         return Ok(ExitCode::SUCCESS);
     }
 
     // Before anything is measured, which takes memory of its own.
-    let peak_memory = peak_memory();
+    let peak_memory = memory::peak();
     bars.start("measure", 0);
     let before = before(&input.input, args.tell.report)?;
     let after = after(&report, goal, bytes, args.tell.report)?;
@@ -137,12 +140,4 @@ fn after(report: &RepairReport, goal: &Path, bytes: u64, asked: ReportArg) -> Re
         volume: Some(report.volume),
         measured: is_known.then(|| Measured::file(goal)).transpose()?,
     })
-}
-
-/// The most memory that this process has held at once, where the system tells.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(1024 * kibibytes)
 }
