@@ -184,6 +184,11 @@ impl Crossings {
         &self.normals
     }
 
+    /// Bricks, offsets and normals, taken apart.
+    pub(super) fn into_parts(self) -> (Bricks, Codes, Codes) {
+        (self.bricks, self.offsets, self.normals)
+    }
+
     /// The places in the arrays of the crossings of some bricks.
     pub fn places(&self, bricks: Range<usize>) -> Range<usize> {
         let first = |i| if i < self.bricks.len() { self.bricks[i].first as usize } else { self.len() };

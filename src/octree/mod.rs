@@ -20,6 +20,7 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+pub mod compact;
 pub mod crossings;
 mod locate;
 mod neighbour;
@@ -39,6 +40,7 @@ use hashbrown::hash_map::Entry;
 use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
+pub use compact::CompactOctree;
 pub use crossings::Crossings;
 pub use neighbour::Neighbours;
 pub use signed::SignedOctree;

@@ -1,6 +1,6 @@
 //! `zmend repair`: the main job.
 
-use crate::args::{RepairArgs, ReportArg};
+use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg};
 use crate::bars::Bars;
 use crate::measure::{Measured, Side};
 use crate::summary::Summary;
@@ -67,6 +67,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         .chain([("write", total.saturating_sub(repaired)), ("total", total)])
         .collect();
     let summary = Summary {
+        ignored: ignored(args, format),
         input: input.input.info(),
         before,
         goal,
@@ -81,6 +82,22 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     };
     let told = if args.tell.json { summary.print_json() } else { summary.print() };
     told.map(|()| ExitCode::SUCCESS)
+}
+
+/// What was asked for and makes no difference.
+fn ignored(args: &RepairArgs, format: Format) -> Vec<String> {
+    let mut ignored = Vec::new();
+    if args.write.ascii && !matches!(format, Format::Stl | Format::Ply) {
+        ignored.push(format!("--ascii makes no difference: {format} is always text"));
+    }
+    if args.surface.faces == FacesArg::Polygons {
+        if format == Format::Stl {
+            ignored.push("--faces polygons makes no difference: STL has nothing but triangles".to_owned());
+        } else if args.surface.kind == SurfaceArg::Mc {
+            ignored.push("--faces polygons makes no difference: marching cubes makes triangles".to_owned());
+        }
+    }
+    ignored
 }
 
 /// An input whose bounds are found once, although both the precision of the output and the repair depend on them.

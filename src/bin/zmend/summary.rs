@@ -22,6 +22,8 @@ pub(crate) struct Summary<'a> {
     pub(crate) after: Side,
     pub(crate) options: Options,
     pub(crate) report: RepairReport,
+    /// What was asked for and made no difference, in words.
+    pub(crate) ignored: Vec<String>,
     /// Wall-clock time of each stage, and in total.
     pub(crate) times: Vec<(&'static str, Duration)>,
     pub(crate) peak_memory: Option<u64>,
@@ -119,6 +121,7 @@ impl Summary<'_> {
     /// All that the user should know.
     fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.report.warnings.iter().map(ToString::to_string).collect();
+        warnings.extend_from_slice(&self.ignored);
         if self.input.trailing_bytes > 0 {
             let ignored = units::counted(self.input.trailing_bytes, "byte", "bytes");
             warnings.push(format!("{ignored} behind the end of the input's mesh were ignored"));
