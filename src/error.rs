@@ -102,7 +102,7 @@ impl fmt::Display for Bytes {
             1_000_000_000..1_000_000_000_000 => (self.0 as f64 / 1e9, "GB"),
             1_000_000_000_000.. => (self.0 as f64 / 1e12, "TB"),
         };
-        let decimals = if size < 9.95 { 1 } else { 0 };
+        let decimals = usize::from(size < 9.95);
         write!(f, "{size:.decimals$} {unit}")
     }
 }

@@ -391,11 +391,16 @@ fn grids_are_given_by_cells_and_boxes() {
     assert_solid(&folder.path("b.ply"));
     // The same grid for two models: the same lattice planes.
     let json = folder.run("repair cube.off c.ply --force --box -5 -5 -5 10 --cell 0.3 --json").ok().json();
-    assert_eq!((&json["grid"]["size"], &json["grid"]["origin"]), (&19.2.into(), &serde_json::json!([-5.0, -5.0, -5.0])));
+    assert_eq!(
+        (&json["grid"]["size"], &json["grid"]["origin"]),
+        (&19.2.into(), &serde_json::json!([-5.0, -5.0, -5.0]))
+    );
     assert_eq!(json["options"]["box"]["size"], 10.0);
     folder.run("repair cube.off d.ply --box 0.5 -5 -5 10").fails(&["box: the model", "least x", "holds it"]);
     folder.run("repair cube.off d.ply --cell 1e-9").fails(&["cell: ", "262144", "take cells of"]);
-    for bad in ["--cell 1 --depth 8", "--box 0 0 0 9 --scale 0.5", "--cell 0", "--cell -1", "--box 0 0 0", "--max-memory 0"] {
+    for bad in
+        ["--cell 1 --depth 8", "--box 0 0 0 9 --scale 0.5", "--cell 0", "--cell -1", "--box 0 0 0", "--max-memory 0"]
+    {
         folder.run(&format!("repair cube.off d.ply {bad}")).refused(&[bad.split_once(' ').unwrap().0]);
     }
     assert!(!folder.path("d.ply").exists());

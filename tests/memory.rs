@@ -103,8 +103,8 @@ fn interrupt(signals: &[&str]) -> (Output, Duration) {
     std::thread::sleep(Duration::from_millis(50));
     let sent = Instant::now();
     for signal in signals {
-        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        let status = Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap();
+        assert!(status.success());
     }
     let output = child.wait_with_output().unwrap();
     let elapsed = sent.elapsed();

@@ -121,7 +121,7 @@ fn trace(crossings: &Crossings, odd: &[Key], progress: &dyn Progress) -> Result<
         }
         loop {
             steps += 1;
-            if steps % 4096 == 0 {
+            if steps.is_multiple_of(4096) {
                 check(progress)?;
             }
             if let Some(&since) = on_walk.get(&cell) {
