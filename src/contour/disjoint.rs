@@ -68,7 +68,7 @@ pub(super) fn disjoint_contouring(
     progress.begin(Stage::Contour, 4 * bricks as u64);
     let (count, piece) = pieces(bricks, PIECE);
     let mut placed =
-        Placed { layout: Layout::new(octree, KnotVertices::None), positions: Segments::default(), sharp: Vec::new() };
+        Placed { layout: Layout::new(octree, KnotVertices::None)?, positions: Segments::default(), sharp: Vec::new() };
     let layout = &placed.layout;
     let (positions, sharp) = (&mut placed.positions, &mut placed.sharp);
     in_order(

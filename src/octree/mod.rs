@@ -21,6 +21,7 @@
 //! ```
 
 pub(crate) mod cells;
+pub mod compact;
 pub mod crossings;
 mod locate;
 mod neighbour;
@@ -41,6 +42,7 @@ use hashbrown::hash_map::Entry;
 use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
+pub use compact::CompactOctree;
 pub use crossings::Crossings;
 pub use neighbour::Neighbours;
 pub use points::{CellPoints, StoredPoints};
