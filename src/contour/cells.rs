@@ -89,6 +89,10 @@ impl<'a> Cells<'a> {
         }
     }
 
+    pub(super) fn brick(&self) -> &'a Brick {
+        self.brick
+    }
+
     /// The corners of a cell that are inside.
     #[inline]
     pub(super) fn mask(&self, cell: Local) -> Mask {

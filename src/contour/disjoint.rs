@@ -31,7 +31,7 @@
 use super::PIECE;
 use super::dual::{DualOptions, Faces};
 use super::envelope::{Safe, safe_diagonals};
-use super::layout::{CellTable, Knot, KnotVertices, Layout, Seen};
+use super::layout::{CellTable, Knot, Layout, Seen, Style};
 use super::place::Planes;
 use crate::error::Result;
 use crate::geom::Frame;
@@ -67,7 +67,8 @@ pub(super) fn disjoint_contouring(
     let bricks = octree.crossings().bricks().len();
     progress.begin(Stage::Contour, 4 * bricks as u64);
     let (count, piece) = pieces(bricks, PIECE);
-    let mut placed = Placed { layout: Layout::new(octree, KnotVertices::None), positions: Segments::default(), sharp: Vec::new() };
+    let mut placed =
+        Placed { layout: Layout::new(octree, Style::Disjoint), positions: Segments::default(), sharp: Vec::new() };
     let layout = &placed.layout;
     let (positions, sharp) = (&mut placed.positions, &mut placed.sharp);
     in_order(
@@ -141,9 +142,8 @@ fn place(
     range: Range<usize>,
 ) -> (Vec<InCell>, Vec<Plane>) {
     let mut positions = Vec::with_capacity((layout.first_of(range.end) - layout.first_of(range.start)) as usize);
-    let creased = range.map(|i| {
-        planes.place_brick(layout, i, options.placement, |cell, p| positions.push(rounded(cell, p)))
-    });
+    let creased =
+        range.map(|i| planes.place_brick(layout, i, options.placement, |cell, p| positions.push(rounded(cell, p))));
     let creased = creased.collect();
     (positions, creased)
 }
@@ -174,7 +174,8 @@ impl Placed<'_> {
     #[inline(never)]
     fn cut(&self, table: &mut CellTable<Vec4>, triangles: bool, range: Range<usize>) -> CutPiece {
         let crossings = self.layout.octree.crossings();
-        let mut found = CutPiece { cuts: Vec::with_capacity(crossings.places(range.clone()).len()), ..CutPiece::default() };
+        let mut found =
+            CutPiece { cuts: Vec::with_capacity(crossings.places(range.clone()).len()), ..CutPiece::default() };
         for i in range {
             self.fill(table, i);
             let mut points = 0;
@@ -378,7 +379,8 @@ impl Disjoint<'_> {
         case.triangles.iter().for_each(|triangle| faces.triangles(&[triangle.map(point)]));
         for cycle in &case.cycles {
             for (&from, &to) in cycle.iter().zip(cycle.iter().cycle().skip(1)) {
-                let face = from.faces().into_iter().find(|f| to.faces().contains(f)).expect("a step runs through a face");
+                let face =
+                    from.faces().into_iter().find(|f| to.faces().contains(f)).expect("a step runs through a face");
                 let mut beyond = at;
                 let a = face.axis().index();
                 beyond[a] = if face.is_high() { at[a] + 1 } else { at[a] - 1 };

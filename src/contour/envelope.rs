@@ -116,6 +116,9 @@ mod tests {
         // Vertex 2 lies behind the line from 1 to 3: only the diagonal to it is inside.
         let v = Vec4::new(-0.9, -0.9, 0.1, 0.1);
         let u = Vec4::new(-0.9, 0.9, 0.01, -0.9);
-        assert_eq!(safe_diagonals(u, v - Vec4::new(0.0, 0.0, 0.09, 0.0), Vec4::splat(0.5)), Safe { first: true, second: false });
+        assert_eq!(
+            safe_diagonals(u, v - Vec4::new(0.0, 0.0, 0.09, 0.0), Vec4::splat(0.5)),
+            Safe { first: true, second: false }
+        );
     }
 }

@@ -10,7 +10,6 @@ use crate::grid::{Axis, Corner, Edge, Face};
 use glam::DVec3;
 
 impl Layout<'_> {
-
     /// The polygons beside inside edges and on inside faces of irregular cells, each with its brick.
     pub(super) fn extra_polygons(&self) -> Vec<(usize, Vec<u32>)> {
         let mut polygons = Vec::new();
@@ -77,7 +76,6 @@ impl Layout<'_> {
         }
         polygon
     }
-
 }
 
 fn point(cell: [u32; 3], corner: Corner) -> DVec3 {

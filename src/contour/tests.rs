@@ -9,8 +9,8 @@ use crate::octree::crossings::{Builder, Sample, Toggle, finest_element};
 use crate::progress::Silent;
 use crate::sign::parity_signs;
 use glam::DVec3;
-use rayon::prelude::*;
 use proptest::prelude::*;
+use rayon::prelude::*;
 
 const DEPTH: u32 = 5;
 const N: u32 = 1 << DEPTH;
@@ -186,7 +186,9 @@ fn meets(segment: [Point; 2], t: [Point; 3]) -> bool {
     let turn = |a: Point, b: Point, c: Point| dot(n, normal([a, b, c])).signum();
     let holds = |p: Point| (0..3).all(|i| turn(t[i], t[(i + 1) % 3], p) >= 0);
     let crosses = |a: Point, b: Point| {
-        turn(a, b, p) * turn(a, b, q) <= 0 && turn(p, q, a) * turn(p, q, b) <= 0 && [turn(a, b, p), turn(a, b, q)] != [0, 0]
+        turn(a, b, p) * turn(a, b, q) <= 0
+            && turn(p, q, a) * turn(p, q, b) <= 0
+            && [turn(a, b, p), turn(a, b, q)] != [0, 0]
     };
     holds(p) || holds(q) || (0..3).any(|i| crosses(t[i], t[(i + 1) % 3]))
 }
@@ -217,7 +219,8 @@ fn intersect(points: &[Point], s: [u32; 3], t: [u32; 3]) -> bool {
 
 /// All pairs of triangles that intersect. Quadrilaterals are cut at the first diagonal or at the second.
 fn intersections(mesh: &Mesh, second: bool) -> Vec<[[u32; 3]; 2]> {
-    let points: Vec<Point> = mesh.points.iter().map(|p| p.to_array().map(|c| (c * f64::from(1 << 30)) as i128)).collect();
+    let points: Vec<Point> =
+        mesh.points.iter().map(|p| p.to_array().map(|c| (c * f64::from(1 << 30)) as i128)).collect();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     for face in mesh.faces.iter() {
         match *face {
@@ -266,31 +269,47 @@ fn intersections_are_found() {
 #[test]
 fn nothing_intersects_that_should_not() {
     let cases: u64 = std::env::var("ZMEND_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(600);
-    let bad: Vec<String> = (0..cases).into_par_iter().flat_map_iter(|seed| {
-        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let mut chance = move || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let z = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            z ^ z >> 31
-        };
-        let (signs, more) = (chance(), chance());
-        let signs = match seed % 3 { 0 => signs, 1 => signs & more, _ => signs | more };
-        let inside = |p: [u32; 3]| {
-            let [x, y, z] = p.map(|c| c.wrapping_sub(6));
-            x < 4 && y < 4 && z < 4 && signs >> (16 * x + 4 * y + z) & 1 == 1
-        };
-        let extreme = seed % 4;
-        let octree = octree_of(4, inside, || {
-            let bits = chance();
-            let offset = match (extreme, bits >> 60) { (0, _) | (_, 0..8) => bits as u16, (_, 8..12) => 0, _ => u16::MAX };
-            Sample::new(offset, (bits >> 16) as u16 % 0xff00)
-        });
-        let frame = Frame::new(DVec3::ZERO, 16.0, 4).unwrap();
-        check_with(&octree, &frame).into_iter().enumerate().filter(|(i, _)| ![1, 2, 3].contains(i)).flat_map(move |(i, mesh)| {
-            let found = [false, true].map(|second| intersections(&mesh, second).len());
-            (found != [0, 0]).then(|| format!("seed {seed}, surface {i}: {found:?}"))
-        }).collect::<Vec<_>>()
-    }).collect();
+    let bad: Vec<String> = (0..cases)
+        .into_par_iter()
+        .flat_map_iter(|seed| {
+            let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mut chance = move || {
+                state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+                let z = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+                z ^ z >> 31
+            };
+            let (signs, more) = (chance(), chance());
+            let signs = match seed % 3 {
+                0 => signs,
+                1 => signs & more,
+                _ => signs | more,
+            };
+            let inside = |p: [u32; 3]| {
+                let [x, y, z] = p.map(|c| c.wrapping_sub(6));
+                x < 4 && y < 4 && z < 4 && signs >> (16 * x + 4 * y + z) & 1 == 1
+            };
+            let extreme = seed % 4;
+            let octree = octree_of(4, inside, || {
+                let bits = chance();
+                let offset = match (extreme, bits >> 60) {
+                    (0, _) | (_, 0..8) => bits as u16,
+                    (_, 8..12) => 0,
+                    _ => u16::MAX,
+                };
+                Sample::new(offset, (bits >> 16) as u16 % 0xff00)
+            });
+            let frame = Frame::new(DVec3::ZERO, 16.0, 4).unwrap();
+            check_with(&octree, &frame)
+                .into_iter()
+                .enumerate()
+                .filter(|(i, _)| ![1, 2, 3].contains(i))
+                .flat_map(move |(i, mesh)| {
+                    let found = [false, true].map(|second| intersections(&mesh, second).len());
+                    (found != [0, 0]).then(|| format!("seed {seed}, surface {i}: {found:?}"))
+                })
+                .collect::<Vec<_>>()
+        })
+        .collect();
     assert!(bad.is_empty(), "{} of {cases}: {:#?}", bad.len(), &bad[..bad.len().min(20)]);
 }
