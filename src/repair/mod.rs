@@ -128,7 +128,6 @@ fn extract(
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
-    progress.hold(octree.bytes() as u64)?;
     let placement = match options.surface {
         Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
         Surface::DualContouring => Placement::SharpFeatures,
