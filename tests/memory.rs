@@ -48,7 +48,8 @@ fn the_peak_stays_below_the_limit() {
         ("repair knot-holes.ply a.ply -d 9", 20),
         ("repair knot-holes.ply a.stl -d 9 -s dc", 20),
         ("repair scan.ply a.ply -d 9 -s quads", 20),
-        ("repair cube.ply a.stl -d 10", 20),
+        ("repair cube.ply a.stl -d 10", 60),
+        ("repair cube.ply a.ply -d 10 -s dc", 40),
     ] {
         let mut limit = least * 1_000_000u64;
         let mut refusals = 0;

@@ -36,7 +36,8 @@ const SAFETY: f64 = 1.1;
 pub(super) struct Guard<'a> {
     progress: &'a dyn Progress,
     limit: u64,
-    /// The most that was held since the stage began.
+    /// The most that was held. It counts as held ever after where something large is added: allocators rarely give back to the
+    /// system what lies among other things.
     held: AtomicU64,
 }
 
@@ -96,12 +97,11 @@ fn estimate(hits: f64, options: &Options, sink: Option<&dyn MeshSink>) -> f64 {
     let sizes = MeshSizes { points: count, faces, corners: faces.saturating_mul(arity) };
     // Sinks need not reckon with more than there can be.
     let sink = sink.filter(|_| hits < 1e15).map_or(0.0, |sink| sink.bytes_for(sizes) as f64);
-    (hits * HIT).max(octree + hits * tables + sink)
+    (hits * HIT).max(octree + hits * tables) + sink
 }
 
 impl Progress for Guard<'_> {
     fn begin(&self, stage: Stage, total: u64) {
-        self.held.store(0, Ordering::Relaxed);
         self.progress.begin(stage, total);
     }
 
@@ -122,7 +122,7 @@ impl Progress for Guard<'_> {
     }
 }
 
-/// A sink that is only begun if what it will hold may be held beside what the running stage holds.
+/// A sink that is only begun if what it will hold may be held beside what the stages hold.
 pub(super) struct GuardedSink<'a> {
     pub(super) sink: &'a mut (dyn MeshSink + Send),
     pub(super) guard: &'a Guard<'a>,

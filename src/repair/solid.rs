@@ -45,7 +45,6 @@ impl Solid {
         progress: &dyn Progress,
     ) -> Result<MeshSizes> {
         let Solid { octree, frame, points } = self;
-        progress.hold(octree.bytes() as u64)?;
         if options.surface == Surface::MarchingCubes {
             return marching_cubes(octree, frame, sink, progress);
         }
