@@ -219,6 +219,13 @@ impl Crossings {
         brick.plus.map(|place| if place == NO_BRICK { &NOTHING } else { &self.bricks[place as usize] })
     }
 
+    /// The places of the bricks at +x, +y, +z of a brick.
+    #[inline]
+    pub fn plus_places(&self, brick: &Brick) -> [Option<usize>; 3] {
+        let [x, y, z, ..] = brick.plus;
+        [x, y, z].map(|place| (place != NO_BRICK).then_some(place as usize))
+    }
+
     /// The lattice point at which a brick starts, in cells.
     pub fn origin(&self, brick: &Brick) -> [u32; 3] {
         lattice_point(self.depth, brick.key)
@@ -244,7 +251,7 @@ impl Crossings {
     }
 
     /// The sample at a place of the arrays.
-    fn sample_at(&self, place: usize) -> Sample {
+    pub(super) fn sample_at(&self, place: usize) -> Sample {
         Sample { offset: self.offsets[place], normal: if self.with_normals { self.normals[place] } else { 0 } }
     }
 

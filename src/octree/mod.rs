@@ -23,6 +23,7 @@
 pub(crate) mod cells;
 pub mod compact;
 pub mod crossings;
+pub mod hits;
 mod locate;
 mod neighbour;
 #[cfg(test)]
@@ -44,6 +45,7 @@ use crate::grid::key::MAX_LEVEL;
 
 pub use compact::CompactOctree;
 pub use crossings::Crossings;
+pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
 pub use points::{CellPoints, StoredPoints};
 pub use signed::SignedOctree;

@@ -1,11 +1,13 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod inside;
 mod memory;
 mod options;
 mod report;
 mod solid;
 
-pub use options::{Faces, Options, Surface};
+pub use inside::{InsideChoice, Reason};
+pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 pub use solid::Solid;
 
@@ -13,7 +15,7 @@ use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::progress::{Progress, Silent, Stage};
-use crate::sign::{close, parity_signs, scan};
+use inside::{Told, tell};
 use memory::{Guard, GuardedSink};
 use report::Clock;
 
@@ -116,14 +118,9 @@ fn mend(
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let scanned = clock.time(Stage::Scan, || scan(source, &frame, options.surface.needs_normals(), progress))?;
-    let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
-    let octree = clock.time(Stage::Sign, || {
-        progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
+    let told = tell(source, &frame, options.surface.needs_normals(), options.inside, &mut clock, progress)?;
+    let Told { octree, counts, closing, choice, clipped } = told;
 
-    let counts = scanned.counts;
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
     }
@@ -132,6 +129,7 @@ fn mend(
         (counts.outside_triangles, Warning::OutsideTriangles),
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
+        (clipped, Warning::Clipped),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
     let report = RepairReport {
@@ -139,6 +137,7 @@ fn mend(
         frame,
         scan: counts,
         closing,
+        inside: choice,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,

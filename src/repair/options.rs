@@ -29,6 +29,8 @@ pub struct Options {
     /// Bytes that the repair may hold, with what the sink holds but without the source: a repair that needs more is refused, with an
     /// estimate of what would do, at once or as soon as it is known. Default `None`: no limit.
     pub max_memory: Option<u64>,
+    /// How inside is told from outside. Default [`Inside::Auto`].
+    pub inside: Inside,
 }
 
 impl Default for Options {
@@ -38,6 +40,7 @@ impl Default for Options {
             cell: None,
             scale: 0.9,
             cube: None,
+            inside: Inside::default(),
             surface: Surface::default(),
             faces: Faces::default(),
             no_self_intersections: false,
@@ -95,4 +98,24 @@ impl Surface {
     pub fn needs_normals(self) -> bool {
         self == Surface::DualContouring
     }
+}
+
+/// Rules of what is inside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Inside {
+    /// Looks at the surface and takes one of the others; the [report](super::InsideChoice) says which and why.
+    ///
+    /// A surface that is closed, oriented and does not overlap itself gives the same by all rules, at the cost of parity. One that is
+    /// closed and oriented but overlaps itself goes by winding number. So does an open one, if its faces are turned the same way and it is
+    /// more than a sheet. Where orientation is not to be trusted, parity is taken.
+    #[default]
+    Auto,
+    /// Inside is what an odd number of walls keeps from the outside, once holes are closed. Which way faces are turned makes no
+    /// difference. The overlap of two solids is outside, and so is a shell within a shell.
+    Parity,
+    /// Inside is what the surface goes round, by the way its faces are turned: the union of solids that overlap or lie in each other,
+    /// without walls in between; a cavity is one whose faces are turned to it. Holes are closed by a smooth surface, the generalised
+    /// winding number of one half. See [`sign::winding`](crate::sign::winding).
+    Winding,
 }

@@ -3,10 +3,10 @@
 //! Triangles come in any order, bricks want their hits together. So each thread drops the hits of its triangles into
 //! buckets, one for each block of 8 x 8 x 8 bricks (64^3 cells); later every block is sorted and resolved by itself.
 //!
-//! A hit is 8 bytes: which edge of the block (brick 9 bits, axis 2, position in the brick 9), where on the edge (16 bits)
-//! and the code of the normal (16 bits). Sorting the 64-bit words brings the hits of an edge together, edges in the order in
-//! which bricks store them. Buckets grow by chunks which are never moved: the first holds 64 hits, later ones twice as many as the one
-//! before, up to 4 KB. All chunks are noted in a [`Ledger`], and where they become too many, hits are dropped from then on.
+//! A hit is 8 bytes: which edge of the block (brick 9 bits, axis 2, position in the brick 9), where on the edge (16 bits),
+//! the code of the normal (16 bits) and the orientation (1 bit). Sorting the 64-bit words brings the hits of an edge together, edges in
+//! the order in which bricks store them. Buckets grow by chunks which are never moved: the first holds 64 hits, later ones twice as many
+//! as the one before, up to 4 KB. All chunks are noted in a [`Ledger`], and where they become too many, hits are dropped from then on.
 
 use crate::error::{Error, Result};
 use crate::geom::normal::NormalCode;
@@ -33,31 +33,36 @@ pub(super) struct Hit(u64);
 impl Hit {
     /// The brick's number in the block, in Z-order.
     pub(super) fn brick(self) -> u32 {
-        (self.0 >> 43) as u32
+        (self.0 >> 44) as u32
     }
 
     /// Brick, axis and position in one number: equal for hits on the same edge.
     pub(super) fn slot(self) -> u32 {
-        (self.0 >> 32) as u32
+        (self.0 >> 33) as u32
     }
 
     /// The edge's axis: 0, 1, 2 for x, y, z.
     pub(super) fn axis(self) -> usize {
-        (self.0 >> 41) as usize & 3
+        (self.0 >> 42) as usize & 3
     }
 
     /// The edge's position in its brick.
     pub(super) fn local(self) -> u32 {
-        (self.0 >> 32) as u32 & 511
+        (self.0 >> 33) as u32 & 511
     }
 
     /// 65536ths of a cell from the edge's start.
     pub(super) fn offset(self) -> u16 {
-        (self.0 >> 16) as u16
+        (self.0 >> 17) as u16
     }
 
     pub(super) fn normal(self) -> NormalCode {
-        NormalCode(self.0 as u16)
+        NormalCode((self.0 >> 1) as u16)
+    }
+
+    /// Whether who walks along the axis goes out here, as the triangle is oriented.
+    pub(super) fn leaves(self) -> bool {
+        self.0 & 1 == 1
     }
 }
 
@@ -186,7 +191,7 @@ pub(super) struct HitSorter<'a> {
     by_block: HashMap<BlockCoords, usize, ahash::RandomState>,
     /// The block of the last hit, and its bucket.
     current: Option<(BlockCoords, usize)>,
-    /// Axis and normal of the triangle at work, in place.
+    /// Axis, normal and orientation of the triangle at work, in place.
     plane: u64,
     with_normals: bool,
 }
@@ -226,7 +231,7 @@ impl Hits for HitSorter<'_> {
     #[inline]
     fn plane(&mut self, axis: Axis, normal: [f64; 3]) {
         let code = if self.with_normals { NormalCode::encode(axis, normal) } else { NormalCode(0) };
-        self.plane = (axis.index() as u64) << 41 | u64::from(code.0);
+        self.plane = (axis.index() as u64) << 42 | u64::from(code.0) << 1 | u64::from(normal[axis.index()] > 0.0);
     }
 
     #[inline]
@@ -238,7 +243,7 @@ impl Hits for HitSorter<'_> {
         };
         let [x, y, z] = at.map(|c| c as usize & 63);
         let slot = SLOT_BITS[0][x] | SLOT_BITS[1][y] | SLOT_BITS[2][z];
-        let hit = Hit(u64::from(slot) << 32 | u64::from(offset) << 16 | self.plane);
+        let hit = Hit(u64::from(slot) << 33 | u64::from(offset) << 17 | self.plane);
         let bucket = &mut self.buckets[bucket].1;
         if bucket.open.len() == bucket.open.capacity() {
             bucket.next_chunk(self.ledger);
@@ -251,7 +256,7 @@ impl Hits for HitSorter<'_> {
     }
 }
 
-/// Sorts hits by edge, then by offset and normal. Returns whether some edge has several.
+/// Sorts hits by edge, then by offset, normal and orientation. Returns whether some edge has several.
 #[inline(never)]
 pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
     const DIGIT: u32 = 10;
@@ -264,10 +269,10 @@ pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
     let digit = |h: Hit, shift: u32| (h.0 >> shift) as usize & ((1 << DIGIT) - 1);
     let mut next = [[0u32; 1 << DIGIT]; 2];
     for &h in hits.iter() {
-        next[0][digit(h, 32)] += 1;
-        next[1][digit(h, 32 + DIGIT)] += 1;
+        next[0][digit(h, 33)] += 1;
+        next[1][digit(h, 33 + DIGIT)] += 1;
     }
-    for (shift, next) in [32, 32 + DIGIT].into_iter().zip(&mut next) {
+    for (shift, next) in [33, 33 + DIGIT].into_iter().zip(&mut next) {
         let mut sum = 0;
         for n in next.iter_mut() {
             sum += std::mem::replace(n, sum);
@@ -343,6 +348,7 @@ mod tests {
         assert_eq!(brick_coords(hits[0].brick()), [5, 2, 7]);
         assert_eq!((hits[0].local(), hits[0].axis(), hits[0].offset()), (64 * 3 + 8 * 7 + 1, 1, 999));
         assert_eq!(hits[0].normal().decode(Axis::Y), glam::Vec3A::Y);
+        assert!(hits[0].leaves());
     }
 
     #[test]
@@ -351,7 +357,7 @@ mod tests {
         let mut hits: Vec<_> = (0..5000)
             .map(|_| {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                Hit((state >> 12) & !(0xfff << 40))
+                Hit((state >> 11) & !(0xfff << 41))
             })
             .collect();
         let mut expected = hits.clone();

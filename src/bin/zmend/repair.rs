@@ -92,6 +92,7 @@ pub(crate) fn options(args: &RepairArgs) -> Options {
         cell: args.grid.cell,
         scale: args.grid.scale,
         cube: args.grid.cube(),
+        inside: args.inside.rule.into(),
         surface: args.surface.kind.into(),
         faces: args.surface.faces.into(),
         no_self_intersections: args.surface.no_self_intersections,

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::Duration;
 use zmend::io::{Format, InputInfo, Precision};
-use zmend::{Options, RepairReport, Result, Surface};
+use zmend::{Inside, Options, RepairReport, Result, Surface};
 
 /// All that a repair has to tell.
 pub(crate) struct Summary<'a> {
@@ -44,6 +44,8 @@ impl Summary<'_> {
             self.goal.display(),
             surface_name(self.options.surface),
         ))?;
+        let choice = &self.report.inside;
+        print::out(&format!("inside by {}: {}\n", inside_name(choice.rule), choice.reason))?;
         self.warnings().iter().for_each(print::warning);
         let seconds: Vec<String> =
             self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
@@ -73,6 +75,7 @@ impl Summary<'_> {
                 "scale": self.options.scale,
                 "box": self.options.cube.map(|cube| json!({ "min": json::vector(cube.min), "size": cube.size })),
                 "max_memory": self.options.max_memory,
+                "inside": inside_name(self.options.inside),
                 "surface": surface_name(self.options.surface),
                 "faces": format!("{:?}", self.options.faces).to_lowercase(),
                 "threads": rayon::current_num_threads(),
@@ -95,6 +98,11 @@ impl Summary<'_> {
                 "odd_faces": closing.odd_faces,
                 "rings": closing.rings,
                 "switched": closing.switched,
+            },
+            "inside": {
+                "rule": inside_name(self.report.inside.rule),
+                "reason": self.report.inside.reason.to_string(),
+                "reversed": self.report.inside.reversed,
             },
             "octree": {
                 "crossings": self.report.crossings,
@@ -140,6 +148,10 @@ impl Summary<'_> {
         }
         warnings
     }
+}
+
+fn inside_name(inside: Inside) -> String {
+    format!("{inside:?}").to_lowercase()
 }
 
 pub(crate) fn surface_name(surface: Surface) -> &'static str {

@@ -24,6 +24,7 @@ Examples:
   zmend repair part.stl fixed.stl --cell 0.1          cells of a tenth of a unit
   zmend repair a.stl b.stl --box -5 -5 -5 10 --depth 9          the same grid for several models
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
+  zmend repair parts.stl one.stl --inside winding     solids that overlap become one
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
@@ -41,6 +42,8 @@ pub(crate) struct RepairArgs {
 
     #[command(flatten)]
     pub(crate) grid: GridArgs,
+    #[command(flatten)]
+    pub(crate) inside: InsideArgs,
     #[command(flatten)]
     pub(crate) surface: SurfaceArgs,
     #[command(flatten)]
@@ -91,6 +94,15 @@ impl GridArgs {
         let [x, y, z, size] = *self.cube.as_deref()? else { return None };
         Some(Cube { min: DVec3::new(x, y, z), size })
     }
+}
+
+/// What is inside.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Inside")]
+pub(crate) struct InsideArgs {
+    /// How inside is told from outside.
+    #[arg(short, long = "inside", value_name = "RULE", value_enum, default_value_t = InsideArg::Auto)]
+    pub(crate) rule: InsideArg,
 }
 
 /// What is extracted.
@@ -162,6 +174,27 @@ impl From<FacesArg> for zmend::Faces {
             FacesArg::Auto => zmend::Faces::Auto,
             FacesArg::Triangles => zmend::Faces::Triangles,
             FacesArg::Polygons => zmend::Faces::Polygons,
+        }
+    }
+}
+
+/// Rules of what is inside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum InsideArg {
+    /// Look at the input, take one of the others, and tell which and why.
+    Auto,
+    /// What an odd number of walls keeps from the outside. Which way faces are turned makes no difference; overlaps become holes.
+    Parity,
+    /// What the faces go round, by the way they are turned: overlaps become unions, walls inside vanish, holes close smoothly.
+    Winding,
+}
+
+impl From<InsideArg> for zmend::Inside {
+    fn from(arg: InsideArg) -> Self {
+        match arg {
+            InsideArg::Auto => zmend::Inside::Auto,
+            InsideArg::Parity => zmend::Inside::Parity,
+            InsideArg::Winding => zmend::Inside::Winding,
         }
     }
 }
