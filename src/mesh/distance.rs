@@ -228,3 +228,152 @@ impl Sums {
         self.squares += other.squares;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use crate::mesh::sample;
+    use crate::progress::Silent;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    const FEW: DistanceOptions = DistanceOptions { samples: 20_000, seed: 1 };
+
+    fn between(a: &Mesh, b: &Mesh) -> Distances {
+        a.distances(b, FEW, &Silent).unwrap().unwrap()
+    }
+
+    fn mapped(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
+        Mesh { points: mesh.points.iter().map(|&p| map(p)).collect(), faces: mesh.faces.clone() }
+    }
+
+    #[track_caller]
+    fn assert_near(found: f64, expected: f64, tolerance: f64) {
+        assert!((found - expected).abs() <= tolerance, "{found} is not {expected}");
+    }
+
+    #[test]
+    fn parallel_planes() {
+        let plate = sample::build("plate", 1).unwrap();
+        let d = between(&plate, &mapped(&plate, |p| p + 0.5 * DVec3::Z));
+        for way in [d.there, d.back] {
+            [way.max, way.mean, way.rms, way.from.distance(way.to)].iter().for_each(|&d| assert_near(d, 0.5, 1e-12));
+            assert_eq!(way.points, FEW.samples + 4);
+        }
+        // Moved in its own plane by half its width, half of it hangs over: from 0 to 1/2 away, evenly.
+        let width = plate.report().bounds.extent().x;
+        let d = between(&plate, &mapped(&plate, |p| p + 0.5 * width * DVec3::X)).there;
+        assert_near(d.max, 0.5 * width, 0.0);
+        assert_near(d.mean, 0.125 * width, 1e-3 * width);
+        assert_near(d.rms, width / 24f64.sqrt(), 1e-3 * width);
+        assert_eq!(d.to.x - d.from.x, 0.5 * width);
+    }
+
+    #[test]
+    fn concentric_spheres() {
+        let ball = sample::build("sphere", 2).unwrap();
+        let d = between(&ball, &mapped(&ball, |p| 1.5 * p));
+        for way in [d.there, d.back] {
+            assert_near(way.max, 0.5, 2e-3);
+            assert_near(way.mean, 0.5, 2e-3);
+            assert_near(way.rms, 0.5, 2e-3);
+            // The closest point lies in the same direction.
+            assert_near(way.from.normalize().dot(way.to.normalize()), 1.0, 1e-3);
+        }
+    }
+
+    #[test]
+    fn one_way_is_not_the_other() {
+        let ball = sample::build("sphere", 1).unwrap();
+        let mut both = ball.clone();
+        let n = ball.points.len() as u32;
+        both.points.extend(ball.points.iter().map(|p| p + 10.0 * DVec3::X));
+        ball.faces.iter().for_each(|f| both.faces.push(&f.iter().map(|i| i + n).collect::<Vec<_>>()));
+        let d = between(&ball, &both);
+        assert!(d.there.max < 1e-12 && d.there.mean < 1e-12, "{d:?}");
+        assert_near(d.hausdorff(), 10.0, 1e-2);
+        assert_near(d.back.from.x, 11.0, 1e-2);
+        assert_eq!(between(&both, &ball).there, d.back);
+        assert!(between(&both, &both).hausdorff() < 1e-12);
+    }
+
+    #[test]
+    fn samples_are_spread_by_area() {
+        // Triangles of very different sizes: a strip whose parts double in length.
+        let points = (0..12).flat_map(|i| [0.0, 1.0].map(|y| DVec3::new(f64::from(1 << i), y, 0.0))).collect();
+        let faces: Vec<[u32; 4]> = (0..11).map(|i| [2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1]).collect();
+        let strip = Mesh { points, faces: faces.iter().map(|f| &f[..]).collect() };
+        let tree = TriangleTree::new(&strip);
+        let points = Samples::new(&tree, FEW).points(0..FEW.samples as usize);
+        assert!(points.iter().all(|p| (1.0..=2048.0).contains(&p.x) && (0.0..=1.0).contains(&p.y) && p.z == 0.0));
+        let mean = points.iter().sum::<DVec3>() / points.len() as f64;
+        assert_near(mean.x, 0.5 * 2049.0, 2.0);
+        assert_near(mean.y, 0.5, 0.01);
+        for x in [2.0, 3.0, 10.0, 100.0, 1000.0, 1500.0] {
+            let below = points.iter().filter(|p| p.x < x).count() as f64 / points.len() as f64;
+            assert_near(below, (x - 1.0) / 2047.0, 2e-3);
+        }
+        // Pieces are parts of the whole.
+        assert_eq!(Samples::new(&tree, FEW).points(8192..9000), points[8192..9000]);
+    }
+
+    #[test]
+    fn what_has_no_area_has_no_distance() {
+        let ball = sample::build("sphere", 1).unwrap();
+        let mut spoilt = ball.clone();
+        spoilt.points.push(DVec3::NAN);
+        spoilt.points.push(DVec3::splat(99.0));
+        let [nan, far] = [1, 2].map(|i| ball.points.len() as u32 + i - 1);
+        spoilt.faces.push(&[0, 1, nan]);
+        spoilt.faces.push(&[0, far, far]);
+        assert!(between(&ball, &spoilt).hausdorff() < 1e-12);
+        let line = Mesh { points: vec![DVec3::ZERO, DVec3::X], faces: [&[0, 1, 0][..]].into_iter().collect() };
+        for empty in [Mesh::default(), line] {
+            assert_eq!(ball.distances(&empty, FEW, &Silent).unwrap(), None);
+            assert_eq!(empty.distances(&ball, FEW, &Silent).unwrap(), None);
+        }
+        // Without samples, corners are all there is.
+        let none = DistanceOptions { samples: 0, ..FEW };
+        let d = ball.distances(&mapped(&ball, |p| 2.0 * p), none, &Silent).unwrap().unwrap().there;
+        assert_eq!(d.points, ball.points.len() as u64);
+        assert_near(d.mean, 1.0, 0.02);
+    }
+
+    #[test]
+    fn seeds_and_threads() {
+        let (a, b) = (sample::build("knot", 1).unwrap(), sample::build("overlap", 1).unwrap());
+        let with = |threads, seed| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| a.distances(&b, DistanceOptions { seed, ..FEW }, &Silent)).unwrap().unwrap()
+        };
+        assert_eq!(with(1, 7), with(3, 7));
+        let (x, y) = (with(2, 1).there, with(2, 2).there);
+        assert!(x.mean != y.mean && (x.mean / y.mean - 1.0).abs() < 0.01, "{x:?} {y:?}");
+    }
+
+    /// Counts, and stops after a number of points.
+    struct Until(AtomicU64, u64);
+
+    impl Progress for Until {
+        fn begin(&self, _: Stage, total: u64) {
+            self.0.fetch_add(total, Ordering::Relaxed);
+        }
+        fn advance(&self, amount: u64) {
+            self.0.fetch_sub(amount, Ordering::Relaxed);
+        }
+        fn is_cancelled(&self) -> bool {
+            self.0.load(Ordering::Relaxed) <= self.1
+        }
+    }
+
+    #[test]
+    fn progress_is_told_and_heeded() {
+        let ball = sample::build("sphere", 1).unwrap();
+        let total = 2 * (FEW.samples + ball.points.len() as u64);
+        let whole = Until(AtomicU64::new(1), 0);
+        assert!(ball.distances(&ball, FEW, &whole).is_ok());
+        assert_eq!(whole.0.into_inner(), 1);
+        let half = Until(AtomicU64::new(0), total / 2);
+        assert!(matches!(ball.distances(&ball, FEW, &half), Err(Error::Cancelled)));
+    }
+}

@@ -337,3 +337,128 @@ fn closest_on(&[a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
     }
     if least == f64::INFINITY { p - normal * (normal.dot(p - a) / squared) } else { closest }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::chance::Chance;
+    use crate::mesh::sample;
+
+    /// Distance to a triangle by another way: the least over a fine fan of points would never be exact, so by barycentric cases.
+    fn naive(&[a, b, c]: &[DVec3; 3], p: DVec3) -> f64 {
+        let on_side = |s: DVec3, t: DVec3| {
+            let along = ((t - s).dot(p - s) / (t - s).length_squared()).clamp(0.0, 1.0);
+            p.distance(s + along * (t - s))
+        };
+        let on_sides = on_side(a, b).min(on_side(b, c)).min(on_side(c, a));
+        // Coordinates of the projection along two sides, from the normal equations.
+        let (u, v, w) = (b - a, c - a, p - a);
+        let (uu, uv, vv, wu, wv) = (u.dot(u), u.dot(v), v.dot(v), w.dot(u), w.dot(v));
+        let determinant = uu * vv - uv * uv;
+        let (s, t) = ((vv * wu - uv * wv) / determinant, (uu * wv - uv * wu) / determinant);
+        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 { on_sides.min(p.distance(a + s * u + t * v)) } else { on_sides }
+    }
+
+    fn check(mesh: &Mesh, points: usize) {
+        let tree = TriangleTree::new(mesh);
+        let mut chance = Chance(5);
+        let mut guess = 0;
+        for i in 0..points {
+            let p = chance.within_cube(if i % 3 == 0 { 20.0 } else { 3.0 });
+            let expected = (0..tree.len() as u32).map(|i| naive(&tree.triangle(i), p)).fold(f64::INFINITY, f64::min);
+            let found = tree.closest(p).unwrap();
+            assert!((found.distance - expected).abs() <= 1e-12 * (1.0 + expected), "{p}: {found:?} {expected}");
+            assert!((found.point.distance(p) - found.distance).abs() <= 1e-12 * (1.0 + expected));
+            // Whatever the search begins with.
+            let again = tree.closest_from(p, guess);
+            assert!((again.0.distance - expected).abs() <= 1e-12 * (1.0 + expected));
+            guess = again.1;
+        }
+    }
+
+    #[test]
+    fn the_closest_point_is_the_closest_of_all() {
+        for (name, points) in [("overlap", 300), ("gear", 100), ("cube", 300), ("plate", 300), ("nan", 300)] {
+            check(&sample::build(name, 1).unwrap(), points);
+        }
+        let mut chance = Chance(9);
+        for n in 1..40 {
+            let points: Vec<DVec3> = (0..3 * n).map(|_| chance.within_cube(2.0)).collect();
+            let faces = (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect::<Vec<[u32; 3]>>();
+            check(&Mesh { points, faces: faces.iter().map(|f| &f[..]).collect() }, 50);
+        }
+    }
+
+    #[test]
+    fn boxes_hold_what_is_below() {
+        for (name, detail) in [("overlap", 1), ("knot", 1), ("plate", 1), ("cube", 3)] {
+            let mesh = sample::build(name, detail).unwrap();
+            let tree = TriangleTree::new(&mesh);
+            let leaves = 1u32 << tree.height();
+            let mut next = 0;
+            for leaf in leaves..2 * leaves {
+                let range = tree.leaf(leaf);
+                assert!(range.start == next && range.len() <= LEAF && !range.is_empty(), "{name} {leaf} {range:?}");
+                next = range.end;
+                let below = range.map(|i| around(&tree.triangle(i))).fold(Bounds::EMPTY, |a, b| union(&a, &b));
+                assert_eq!(*tree.bounds(leaf), below);
+            }
+            assert_eq!(next as usize, tree.len());
+            for node in 1..leaves {
+                assert_eq!(*tree.bounds(node), union(tree.bounds(2 * node), tree.bounds(2 * node + 1)));
+            }
+            let mut faces = tree.faces.clone();
+            faces.sort_unstable();
+            faces.dedup();
+            assert_eq!(faces.len(), mesh.faces.len());
+        }
+    }
+
+    #[test]
+    fn what_bounds_no_surface_is_left_out() {
+        let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::NAN, 2.0 * DVec3::X];
+        let faces: [&[u32]; 6] = [&[0, 1, 4], &[0, 1, 3], &[0, 1, 7], &[1, 2], &[1, 1, 2], &[]];
+        let mut mesh = Mesh { points, faces: faces.into_iter().collect() };
+        let tree = TriangleTree::new(&mesh);
+        assert!(tree.is_empty() && tree.closest(DVec3::ZERO).is_none());
+        mesh.faces.push(&[0, 1, 2]);
+        let tree = TriangleTree::new(&mesh);
+        assert_eq!((tree.len(), tree.used_points()), (1, vec![0, 1, 2]));
+        assert_eq!(tree.closest(DVec3::Z).map(|c| (c.distance, c.face)), Some((1.0, 6)));
+        assert_eq!(tree.closest(DVec3::NAN), None);
+    }
+
+    #[test]
+    fn absurd_sizes_are_measured_all_the_same() {
+        for exponent in [-1050, -900, 900, 1015] {
+            let mut mesh = sample::build("cube", 1).unwrap();
+            let size = f64::powi(2.0, exponent / 2) * f64::powi(2.0, exponent - exponent / 2);
+            mesh.points.iter_mut().for_each(|p| *p *= size);
+            let found = TriangleTree::new(&mesh).closest(DVec3::new(0.5, 0.25, 3.0) * size).unwrap();
+            assert_eq!((found.point / size, found.distance / size), (DVec3::new(0.5, 0.25, 1.0), 2.0), "{exponent}");
+        }
+    }
+
+    #[test]
+    fn far_points_do_no_harm_to_what_is_small() {
+        let mut mesh = sample::build("knot", 1).unwrap();
+        mesh.points.push(DVec3::splat(1e25));
+        let far = mesh.points.len() as u32 - 1;
+        mesh.faces.push(&[0, 1, far]);
+        let tree = TriangleTree::new(&mesh);
+        // Leaves stay small, but for that of the far triangle and some of those beside it.
+        let leaves = 1u32 << tree.height();
+        let small = (leaves..2 * leaves).filter(|&leaf| tree.bounds(leaf).extent().max_element() < 1.0).count();
+        assert!(small as u32 >= leaves - 8, "{small} of {leaves}");
+    }
+
+    #[test]
+    fn threads_make_no_difference() {
+        let mesh = sample::build("overlap", 3).unwrap();
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| TriangleTree::new(&mesh).corners)
+        };
+        assert!(with(1) == with(4));
+    }
+}
