@@ -5,7 +5,7 @@ use clap::{ArgGroup, Parser, Subcommand, ValueEnum, value_parser};
 use std::path::{Path, PathBuf};
 use zmend::geom::frame::{DEPTHS, Frame};
 use zmend::io::Format;
-use zmend::mesh::{Bounds, sample};
+use zmend::mesh::{Bounds, DistanceOptions, sample};
 
 /// Repairs polygon meshes: any soup of polygons in, a closed, manifold, oriented surface out.
 ///
@@ -21,6 +21,7 @@ Examples:
   zmend sample knot-holes broken.ply          write a broken mesh to try
   zmend info broken.ply                       what is wrong with it
   zmend repair broken.ply fixed.ply           repair it
+  zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
 `zmend help COMMAND` tells more."
@@ -37,6 +38,7 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     Repair(RepairArgs),
     Info(InfoArgs),
+    Compare(CompareArgs),
     Sample(SampleArgs),
     Render(RenderArgs),
 }
@@ -215,9 +217,11 @@ pub(crate) enum ReportArg {
 Examples:
   zmend info part.stl
   zmend info *.ply --json        one JSON object a file, one a line
+  zmend info huge.ply --quick    without looking for self-intersections
 
-The triangles of STL files are taken as connected where their corners are identical to the last bit. Whether a surface \
-crosses itself is not looked at.")]
+The triangles of STL files are taken as connected where their corners are identical to the last bit. Self-intersections \
+are pairs of faces that meet anywhere but in common corners and edges: faces that pass through each other, touch, or fold over \
+each other. They are decided exactly, and counted up to a million.")]
 pub(crate) struct InfoArgs {
     /// Meshes to look at.
     #[arg(value_name = "FILE", required = true)]
@@ -225,6 +229,55 @@ pub(crate) struct InfoArgs {
     /// Print one JSON object a file, each on its line.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Do not look for self-intersections, which takes longer than all the rest.
+    #[arg(short, long)]
+    pub(crate) quick: bool,
+}
+
+/// Measure how far two meshes are from each other, and put their numbers side by side.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  zmend compare broken.ply fixed.ply
+  zmend compare scan.stl fixed.stl --samples 5000000
+  zmend compare part.stl fixed.stl --max-distance 0.5% && echo close enough
+  zmend compare a.obj b.obj --json | jq .distance.hausdorff
+
+Distances are those of points on one surface to the closest point on the other, both ways: all corners, and samples spread \
+evenly by area. The Hausdorff distance is the greatest of them. Percentages are of the diagonal of A's bounding box. \
+Far from the other surface is what a repair has closed (B to A) or lost (A to B).")]
+pub(crate) struct CompareArgs {
+    /// The mesh to compare with, for instance the original.
+    #[arg(value_name = "A")]
+    pub(crate) a: PathBuf,
+    /// Another mesh, for instance the repaired one.
+    #[arg(value_name = "B")]
+    pub(crate) b: PathBuf,
+    /// Samples of each surface, beside its corners.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = DistanceOptions::default().samples,
+        value_parser = value_parser!(u64).range(..=10_000_000_000))]
+    pub(crate) samples: u64,
+    /// Other seeds take other samples; the same seed takes the same ones.
+    #[arg(long, value_name = "N", default_value_t = DistanceOptions::default().seed)]
+    pub(crate) seed: u64,
+    /// Fail (exit code 1) if the Hausdorff distance is greater than D, in model units or, as in 0.5%, of the diagonal.
+    #[arg(long, value_name = "D", value_parser = limit, allow_negative_numbers = true)]
+    pub(crate) max_distance: Option<Limit>,
+    /// Do not look for self-intersections.
+    #[arg(short, long)]
+    pub(crate) quick: bool,
+    /// Print one JSON object with everything instead of tables.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The greatest distance that is allowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Limit {
+    /// In model units.
+    Length(f64),
+    /// In hundredths of the diagonal of a box.
+    Percent(f64),
 }
 
 /// Write a built-in mesh, broken or clean, to try things on.
@@ -300,6 +353,14 @@ fn scale(text: &str) -> Result<f64, String> {
     Frame::fit(&unit, *DEPTHS.start(), scale).map(|_| scale).map_err(|e| e.to_string())
 }
 
+/// A length, or a percentage.
+fn limit(text: &str) -> Result<Limit, String> {
+    let (number, limit) =
+        text.strip_suffix('%').map_or((text, Limit::Length as fn(f64) -> Limit), |n| (n, Limit::Percent));
+    let number = number.trim().parse().ok().filter(|n| (0.0..f64::INFINITY).contains(n));
+    number.map(limit).ok_or_else(|| "not a length or percentage such as 0.01 or 0.5%".to_owned())
+}
+
 fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|degrees: &f64| degrees.is_finite()).ok_or_else(|| "not a number of degrees".to_owned())
 }
@@ -334,6 +395,8 @@ mod tests {
         }
         assert_eq!(scale("0.5"), Ok(0.5));
         assert!(["0", "1", "-1", "nan", "inf", "x"].iter().all(|bad| scale(bad).is_err()));
+        assert_eq!((limit("0.25"), limit("2 %")), (Ok(Limit::Length(0.25)), Ok(Limit::Percent(2.0))));
+        assert!(["", "%", "-1", "nan", "inf%", "1%%", "x"].iter().all(|bad| limit(bad).is_err()));
         assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
     }
 }
