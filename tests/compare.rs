@@ -81,8 +81,8 @@ fn distances_and_numbers_stand_side_by_side() {
     assert_eq!((&json["a"]["path"], &json["b"]["format"]), (&"cube.ply".into(), &"obj".into()));
     assert_eq!(json["options"]["samples"], 200_000);
     for way in ["a_to_b", "b_to_a"] {
-        // One face in six is a quarter away, four hang over by a quarter, and one lies within: as far from the middle of its sides as from the
-        // face, at most; the mean of that is the integral of (1 - 2t)^2 for t up to a quarter.
+        // One face in six is a quarter away, four hang over by a quarter, and one lies within: as far from the middle
+        // of its sides as from the face, at most; the mean of that is the integral of (1 - 2t)^2 for t up to a quarter.
         let mean = distance[way]["mean"].as_f64().unwrap();
         assert!((mean - (0.25 + 4.0 * 0.25 * 0.125 + 0.875 / 6.0) / 6.0).abs() < 3e-4, "{mean}");
         assert_eq!(distance[way]["points"], 200_008);

@@ -2,19 +2,22 @@
 //!
 //! # Idea
 //!
-//! Triangles are halved along the longest side of the box of their centres, again and again, until at most eight are left. Halves are
-//! equal in number (give or take one), so the tree is perfect: node `i` has the children `2i` and `2i + 1`, and which triangles are
-//! below a node follows from its number. There are no pointers, and no depth is greater than another, however the input is made.
+//! Triangles are halved along the longest side of the box of their centres, again and again, until at most eight are
+//! left. Halves are equal in number (give or take one), so the tree is perfect: node `i` has the children `2i` and `2i
+//! + 1`, and which triangles are below a node follows from its number. There are no pointers, and no depth is greater
+//! than another, however the input is made.
 //!
 //! # Invariants
 //!
 //! - Node `2^l + j` holds the triangles `n j / 2^l .. n (j + 1) / 2^l`, rounded down.
-//! - The box of a node is the least one around its triangles, exact, in double precision: far outliers do no harm to what is small.
+//! - The box of a node is the least one around its triangles, exact, in double precision: far outliers do no harm to
+//!   what is small.
 //! - The tree depends on the mesh alone, not on the number of threads.
 //!
 //! # Cost
 //!
-//! 16 bytes a triangle and 12 to 24 for boxes, 48 more while it is made. Some 300 ns a triangle on one thread for a million.
+//! 16 bytes a triangle and 12 to 24 for boxes, 48 more while it is made. Some 300 ns a triangle on one thread for a
+//! million.
 
 use super::meet::has_area;
 use super::{Bounds, Mesh, triangulate};
@@ -25,8 +28,8 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// The most triangles of a leaf. With four, the tree is twice as large, distances take 1 to 6 % fewer instructions, and self-intersections
-/// 15 % more.
+/// The most triangles of a leaf. With four, the tree is twice as large, distances take 1 to 6 % fewer instructions, and
+/// self-intersections 15 % more.
 const LEAF: usize = 8;
 /// Triangles below which halving is not worth another thread.
 const ALONE: usize = 1 << 12;
@@ -37,8 +40,8 @@ const SAFE_EXPONENTS: Range<i32> = -100..100;
 
 /// The triangles of a mesh under a tree of boxes: finds the point of the surface that is closest to any other.
 ///
-/// Polygons are cut by [`triangulate`]. What bounds no surface is left out: faces with fewer than three corners, with points that do not
-/// exist or are not finite, and triangles without any area (decided exactly).
+/// Polygons are cut by [`triangulate`]. What bounds no surface is left out: faces with fewer than three corners, with
+/// points that do not exist or are not finite, and triangles without any area (decided exactly).
 ///
 /// ```
 /// use zmend::glam::DVec3;
@@ -110,14 +113,15 @@ impl<'a> TriangleTree<'a> {
         self.corners.is_empty()
     }
 
-    /// The point of the surface that is closest to `p`, or none if there is no surface or `p` is not finite. Where several are, it is
-    /// always the same one for the same mesh. Some 1 µs for a million triangles and a point near the surface, O(log n); a hundred times as
-    /// much for a point from which many are nearly as far.
+    /// The point of the surface that is closest to `p`, or none if there is no surface or `p` is not finite. Where
+    /// several are, it is always the same one for the same mesh. Some 1 µs for a million triangles and a point near the
+    /// surface, O(log n); a hundred times as much for a point from which many are nearly as far.
     pub fn closest(&self, p: DVec3) -> Option<Closest> {
         (p.is_finite() && !self.is_empty()).then(|| self.closest_from(p, 0).0)
     }
 
-    /// [`closest`](Self::closest) for a finite point and a tree that is not empty, with a triangle that may be near, and the triangle found.
+    /// [`closest`](Self::closest) for a finite point and a tree that is not empty, with a triangle that may be near,
+    /// and the triangle found.
     pub(super) fn closest_from(&self, p: DVec3, guess: u32) -> (Closest, u32) {
         let p = p * self.scale;
         let (mut best, mut point) = (guess, closest_on(&self.triangle(guess), p));
@@ -320,8 +324,8 @@ fn distance_squared(bounds: &Bounds, p: DVec3) -> f64 {
     (bounds.min - p).max(p - bounds.max).max(DVec3::ZERO).length_squared()
 }
 
-/// The point of a triangle that is closest to `p`: its projection if that lies inside, else on one of the sides beyond which `p` is (the
-/// way from the closest point of a convex polygon leads away from a side on which that point lies).
+/// The point of a triangle that is closest to `p`: its projection if that lies inside, else on one of the sides beyond
+/// which `p` is (the way from the closest point of a convex polygon leads away from a side on which that point lies).
 fn closest_on(&[a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
     let normal = (b - a).cross(c - a);
     let squared = normal.length_squared();
@@ -348,7 +352,8 @@ mod tests {
     use crate::mesh::chance::Chance;
     use crate::mesh::sample;
 
-    /// Distance to a triangle by another way: the least over a fine fan of points would never be exact, so by barycentric cases.
+    /// Distance to a triangle by another way: the least over a fine fan of points would never be exact, so by
+    /// barycentric cases.
     fn naive(&[a, b, c]: &[DVec3; 3], p: DVec3) -> f64 {
         let on_side = |s: DVec3, t: DVec3| {
             let along = ((t - s).dot(p - s) / (t - s).length_squared()).clamp(0.0, 1.0);

@@ -1,9 +1,10 @@
 //! Inside and outside at every lattice point: what repair, topology and contouring meet in.
 
-use super::crossings::{Crossings, finest_element, position};
+use super::crossings::{Builder, Crossings, Sample, finest_element, position, toward};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
-use crate::parallel::pieces;
+use crate::parallel::{in_order, pieces};
+use crate::progress::Silent;
 use rayon::prelude::*;
 
 /// Crossed edges together with the signs of the lattice points.
@@ -24,6 +25,109 @@ impl SignedOctree {
     pub fn new(crossings: Crossings, inside: Vec<Plane>) -> Self {
         assert_eq!(crossings.bricks().len(), inside.len(), "one plane a brick");
         SignedOctree { crossings, inside }
+    }
+
+    /// Gives each lattice point of each brick its sign: that of the parity of the crossings on the way to it along x from outside of the
+    /// root. Within a brick that is a prefix parity over eight words, 64 lines at once; the carry goes to the next brick of the row.
+    /// Where bricks of a row are missing, nothing is crossed, and the carry is the same for all 64 lines.
+    ///
+    /// `crossings` must have no odd faces ([`Crossings::odd_faces`]): then the way along x is as good as any other.
+    ///
+    /// Cost: some 50 ns a brick, most of it for putting the bricks into rows.
+    pub fn from_crossings(crossings: Crossings) -> Self {
+        debug_assert!(crossings.odd_faces().is_empty(), "closed before signs are counted");
+        let bricks = crossings.bricks();
+        // Bricks by row: y and z, then x, all in bricks.
+        let mut rows: Vec<(u64, u32)> = (0..bricks.len())
+            .into_par_iter()
+            .map(|i| {
+                let [x, y, z] = crossings.origin(&bricks[i]).map(|c| u64::from(c >> 3));
+                ((y << 16 | z) << 16 | x, i as u32)
+            })
+            .collect();
+        rows.par_sort_unstable();
+        let signs: Vec<(u32, Plane)> = rows
+            .par_chunk_by(|a, b| a.0 >> 16 == b.0 >> 16)
+            .flat_map_iter(|row| {
+                let mut carry = 0;
+                row.iter().map(move |&(_, i)| {
+                    let (inside, next) = bricks[i as usize].crossed[0].prefix_parity_x(carry);
+                    carry = next;
+                    (i, inside)
+                })
+            })
+            .collect();
+        let mut inside = vec![Plane::EMPTY; bricks.len()];
+        for (i, plane) in signs {
+            inside[i as usize] = plane;
+        }
+        SignedOctree::new(crossings, inside)
+    }
+
+    /// The octree of given signs: `signs` lists bricks, sorted by key, with their inside points. Edges whose ends differ are crossed;
+    /// for each of them in turn (x-edges before y- before z-edges, then by position) `samples` pushes a sample, given the place of the
+    /// brick in `signs` and its crossed edges.
+    ///
+    /// Every brick that owns a crossed edge must be listed; of the others, `uniform` says whether they lie inside. Listed bricks that turn
+    /// out to be needless are dropped.
+    ///
+    /// Cost: three hash probes and some 100 ns a brick beside `samples`, in parallel.
+    ///
+    /// # Panics
+    /// When a lattice point with a coordinate 0 is inside, when bricks are not in order or `samples` pushes too few or too many.
+    pub fn from_signs(
+        depth: u32,
+        with_normals: bool,
+        signs: &[(Key, Plane)],
+        uniform: impl Fn(Key) -> bool + Sync,
+        samples: impl Fn(usize, &[Plane; 3], &mut Vec<Sample>) + Sync,
+    ) -> Self {
+        assert!(signs.is_sorted_by(|a, b| a.0 < b.0), "bricks are sorted");
+        let mut places = super::LinearOctree::with_capacity(signs.len());
+        for (place, &(key, _)) in (0u32..).zip(signs) {
+            places.insert(key, place);
+        }
+        let crossed = |(key, inside): (Key, Plane)| {
+            let touches = [Plane::touches_min_x, Plane::touches_min_y, Plane::touches_min_z];
+            for (c, touches) in key.min_corner().into_iter().zip(touches) {
+                assert!(c != 0 || !touches(&inside), "points on the root's boundary are outside");
+            }
+            let beside = |steps| match key.toward(toward(steps)) {
+                Some(next) => match places.get(next) {
+                    Some(&i) => signs[i as usize].1,
+                    None if uniform(next) => Plane::FULL,
+                    None => Plane::EMPTY,
+                },
+                None => Plane::EMPTY,
+            };
+            [
+                inside ^ inside.at_plus_x(&beside([1, 0, 0])),
+                inside ^ inside.at_plus_y(&beside([0, 1, 0])),
+                inside ^ inside.at_plus_z(&beside([0, 0, 1])),
+            ]
+        };
+        let mut builder = Builder::new(depth, with_normals);
+        let (count, piece) = pieces(signs.len(), 64);
+        let make = |(): &mut (), n| {
+            let bricks = piece(n).map(|i| {
+                let crossed = crossed(signs[i]);
+                let mut list = Vec::new();
+                samples(i, &crossed, &mut list);
+                (signs[i].0, crossed, list)
+            });
+            bricks.collect()
+        };
+        let append = |bricks: Vec<_>| {
+            for (key, crossed, samples) in bricks {
+                let samples: Vec<Sample> = samples;
+                let offsets: Vec<u16> = samples.iter().map(|s| s.offset).collect();
+                let normals: Vec<u16> = samples.iter().filter(|_| with_normals).map(|s| s.normal).collect();
+                builder.push(key, crossed, &offsets, &normals);
+            }
+            Ok(())
+        };
+        in_order(count, &Silent, || (), make, append).expect("nothing fails or is cancelled");
+        SignedOctree::from_crossings(builder.finish())
     }
 
     /// The crossed edges.
@@ -113,5 +217,56 @@ impl SignedOctree {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::crossings::lattice_point;
+    use super::*;
+    use proptest::prelude::*;
+
+    const DEPTH: u32 = 5;
+    const MIDDLE: Sample = Sample { offset: 1 << 15, normal: 0 };
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn signs_come_back(balls in prop::collection::vec((prop::array::uniform3(1i32..32), 0i32..60), 0..6)) {
+            let within = |p: [u32; 3]| {
+                p.iter().all(|&c| c > 0) && balls.iter().any(|(centre, square)| {
+                    (0..3).map(|a| (p[a] as i32 - centre[a]).pow(2)).sum::<i32>() <= *square
+                })
+            };
+            let mut signs: Vec<(Key, Plane)> = Vec::new();
+            for key in (0..64).map(|i| Key::cell(DEPTH - 3, [i >> 4, i >> 2 & 3, i & 3]).unwrap()) {
+                let mut plane = Plane::EMPTY;
+                let origin = lattice_point(DEPTH, key);
+                for p in (0..512).map(Local::from_index) {
+                    if within(std::array::from_fn(|a| origin[a] + p.coords()[a])) {
+                        plane.set(p);
+                    }
+                }
+                signs.push((key, plane));
+            }
+            signs.sort_unstable_by_key(|s| s.0);
+            let build = |signs: &[(Key, Plane)]| {
+                let uniform = |brick| within(lattice_point(DEPTH, brick));
+                SignedOctree::from_signs(DEPTH, false, signs, uniform, |_, crossed, out| {
+                    out.resize(crossed.iter().map(Plane::count).sum::<u32>() as usize, MIDDLE);
+                })
+            };
+            let octree = build(&signs);
+            prop_assert_eq!(octree.validate(), Ok(()));
+            for i in 0..32 * 32 * 32 {
+                let p = [i >> 10, i >> 5 & 31, i & 31];
+                prop_assert_eq!(octree.is_inside(p), within(p), "{:?}", p);
+            }
+            // The bricks it kept are enough to build it again.
+            let kept: Vec<_> =
+                octree.crossings().bricks().iter().zip(octree.inside()).map(|(b, &inside)| (b.key, inside)).collect();
+            let again = build(&kept);
+            prop_assert_eq!(again.inside(), octree.inside());
+        }
     }
 }

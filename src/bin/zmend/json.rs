@@ -1,4 +1,5 @@
-//! Results as JSON, for scripts. Lengths, areas and volumes are in model units; unknown values are null.
+//! Results as JSON, for scripts. Lengths, areas and volumes are in model units; unknown values are null. Self-intersections
+//! are counted up to a limit, and one more than the limit stands for all beyond.
 
 use crate::measure::{Crossings, Measured, Side};
 use glam::DVec3;

@@ -1,0 +1,174 @@
+//! What `zmend repair` understands.
+
+use super::values::{depth_range, scale};
+use clap::{ArgGroup, ValueEnum};
+use std::path::{Path, PathBuf};
+use zmend::io::Format;
+
+/// Make a closed, manifold, oriented surface of any mesh.
+#[derive(Debug, clap::Args)]
+#[command(
+    group = ArgGroup::new("goal").required(true).args(["out", "output"]),
+    override_usage = "zmend repair [OPTIONS] <IN> <OUT>\n       zmend repair [OPTIONS] <IN> -o <OUT>",
+    after_help = "\
+Examples:
+  zmend repair broken.stl fixed.stl
+  zmend repair broken.obj -o fixed.ply --depth 9      twice as fine, four times the faces and time
+  zmend repair part.stl fixed.stl --surface dc        keep sharp edges and corners
+  zmend repair in.ply out.ply --json --report full    measure both, for scripts
+
+The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
+Holes are closed, and so are gaps between faces that should touch."
+)]
+pub(crate) struct RepairArgs {
+    /// Mesh to repair.
+    #[arg(value_name = "IN")]
+    pub(crate) input: PathBuf,
+    /// File to write: .stl, .ply, .obj or .off.
+    #[arg(value_name = "OUT")]
+    out: Option<PathBuf>,
+    /// The same as OUT.
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) grid: GridArgs,
+    #[command(flatten)]
+    pub(crate) surface: SurfaceArgs,
+    #[command(flatten)]
+    pub(crate) write: WriteArgs,
+    #[command(flatten)]
+    pub(crate) tell: TellArgs,
+}
+
+/// Where cells lie.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Grid")]
+pub(crate) struct GridArgs {
+    /// Resolution: 2^N cells a side, 3 to 18.
+    #[arg(short, long, value_name = "N", default_value_t = 8, value_parser = depth_range(), allow_negative_numbers = true)]
+    pub(crate) depth: u32,
+    /// Part of the grid that the longest side of the model takes, above 0 and below 1.
+    #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale, allow_negative_numbers = true)]
+    pub(crate) scale: f64,
+}
+
+/// What is extracted.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Surface")]
+pub(crate) struct SurfaceArgs {
+    /// Kind of surface.
+    #[arg(short = 's', long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
+    pub(crate) kind: SurfaceArg,
+    /// What the faces are: auto is polygons for quads, triangles for mc and dc.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = FacesArg::Auto)]
+    pub(crate) faces: FacesArg,
+}
+
+/// How the result is written.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct WriteArgs {
+    /// Replace OUT if it exists.
+    #[arg(short, long)]
+    pub(crate) force: bool,
+    /// Format of OUT, whatever its name says.
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FormatArg>,
+    /// Write numbers as text where the format has both (STL, PLY).
+    #[arg(long)]
+    pub(crate) ascii: bool,
+}
+
+/// What is told.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Report")]
+pub(crate) struct TellArgs {
+    /// How much is measured of the input and of the written file.
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = ReportArg::Auto)]
+    pub(crate) report: ReportArg,
+    /// Print one JSON object with everything instead of tables.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors, and measure nothing.
+    #[arg(short, long, conflicts_with_all = ["json", "report"])]
+    pub(crate) quiet: bool,
+}
+
+impl RepairArgs {
+    /// The file to write.
+    pub(crate) fn goal(&self) -> &Path {
+        self.out.as_ref().or(self.output.as_ref()).expect("one of both is required")
+    }
+}
+
+/// Kinds of faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FacesArg {
+    /// Polygons for quads, triangles for mc and dc.
+    Auto,
+    /// Triangles.
+    Triangles,
+    /// Quadrilaterals and a few triangles for dc and quads. Some programs cannot read PLY files with both.
+    Polygons,
+}
+
+impl From<FacesArg> for zmend::Faces {
+    fn from(arg: FacesArg) -> Self {
+        match arg {
+            FacesArg::Auto => zmend::Faces::Auto,
+            FacesArg::Triangles => zmend::Faces::Triangles,
+            FacesArg::Polygons => zmend::Faces::Polygons,
+        }
+    }
+}
+
+/// Kinds of surfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SurfaceArg {
+    /// Marching cubes: triangles.
+    Mc,
+    /// Dual contouring: keeps sharp edges and corners.
+    Dc,
+    /// Dual contouring without sharp edges: smooth quadrilaterals.
+    Quads,
+}
+
+impl From<SurfaceArg> for zmend::Surface {
+    fn from(arg: SurfaceArg) -> Self {
+        match arg {
+            SurfaceArg::Mc => zmend::Surface::MarchingCubes,
+            SurfaceArg::Dc => zmend::Surface::DualContouring,
+            SurfaceArg::Quads => zmend::Surface::Quads,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatArg {
+    Stl,
+    Ply,
+    Obj,
+    Off,
+}
+
+impl From<FormatArg> for Format {
+    fn from(arg: FormatArg) -> Self {
+        match arg {
+            FormatArg::Stl => Format::Stl,
+            FormatArg::Ply => Format::Ply,
+            FormatArg::Obj => Format::Obj,
+            FormatArg::Off => Format::Off,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ReportArg {
+    /// Full for each side of at most 1,000,000 faces, brief for others.
+    Auto,
+    /// What the repair knows anyway.
+    Brief,
+    /// Read the input and the written file whole and measure them.
+    Full,
+}

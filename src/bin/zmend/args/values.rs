@@ -1,0 +1,72 @@
+//! Values that are checked as they are read.
+
+use clap::builder::RangedI64ValueParser;
+use clap::value_parser;
+use zmend::geom::frame::{DEPTHS, Frame};
+use zmend::mesh::{Bounds, sample};
+
+pub(super) fn depth_range() -> RangedI64ValueParser<u32> {
+    value_parser!(u32).range(i64::from(*DEPTHS.start())..=i64::from(*DEPTHS.end()))
+}
+
+pub(super) fn detail_range() -> RangedI64ValueParser<u32> {
+    value_parser!(u32).range(1..=i64::from(sample::MAX_DETAIL))
+}
+
+/// A number that the library takes as scale.
+pub(super) fn scale(text: &str) -> Result<f64, String> {
+    let scale = text.parse().map_err(|_| "not a number".to_owned())?;
+    let unit = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE };
+    Frame::fit(&unit, *DEPTHS.start(), scale).map(|_| scale).map_err(|e| e.to_string())
+}
+
+/// The greatest distance that is allowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Limit {
+    /// In model units.
+    Length(f64),
+    /// In hundredths of the diagonal of a box.
+    Percent(f64),
+}
+
+/// A length, or a percentage.
+pub(super) fn limit(text: &str) -> Result<Limit, String> {
+    let (number, limit) =
+        text.strip_suffix('%').map_or((text, Limit::Length as fn(f64) -> Limit), |n| (n, Limit::Percent));
+    let number = number.trim().parse().ok().filter(|n| (0.0..f64::INFINITY).contains(n));
+    number.map(limit).ok_or_else(|| "not a length or percentage such as 0.01 or 0.5%".to_owned())
+}
+
+pub(super) fn degrees(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|degrees: &f64| degrees.is_finite()).ok_or_else(|| "not a number of degrees".to_owned())
+}
+
+/// The most pixels of a picture, which takes some hundred bytes for each: 40 million are 8 K.
+const MOST_PIXELS: u64 = 40_000_000;
+
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let [width, height]: [u32; 2] = sides.ok_or_else(|| "not of the form 1200x900".to_owned())?;
+    match u64::from(width) * u64::from(height) {
+        1..=MOST_PIXELS => Ok([width, height]),
+        _ => Err(format!("a picture has 1 to {MOST_PIXELS} pixels")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_checked() {
+        assert_eq!(size("1200x900"), Ok([1200, 900]));
+        for bad in ["", "1200", "x", "0x5", "-1x5", "1e3x5", "100000x100000", "99999999999x1"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(scale("0.5"), Ok(0.5));
+        assert!(["0", "1", "-1", "nan", "inf", "x"].iter().all(|bad| scale(bad).is_err()));
+        assert_eq!((limit("0.25"), limit("2 %")), (Ok(Limit::Length(0.25)), Ok(Limit::Percent(2.0))));
+        assert!(["", "%", "-1", "nan", "inf%", "1%%", "x"].iter().all(|bad| limit(bad).is_err()));
+        assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
+    }
+}
