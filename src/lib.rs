@@ -39,15 +39,15 @@
 //! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside.
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
-//!   through each other here and there, mostly at creases and in walls thinner than a cell.
+//! - **Self-intersections are not prevented.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
+//!   through each other here and there, mostly at creases and in walls thinner than a cell. [`Mesh::self_intersections`] finds them.
 //!
 //! # Where to find what
 //!
 //! | module | what it does |
 //! |---|---|
 //! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
-//! | [`mesh`] | [`Mesh`], reports and validation, sources and sinks of meshes that pass by, broken samples to try |
+//! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
 //! | [`io`] | STL, PLY, OBJ and OFF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`contour`] | marching cubes and manifold dual contouring |

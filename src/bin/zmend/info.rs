@@ -1,7 +1,7 @@
 //! `zmend info`: what a mesh is and what is wrong with it.
 
 use crate::args::InfoArgs;
-use crate::measure::{Measured, Side};
+use crate::measure::{Loaded, Measured, Side};
 use crate::print::{self, Table};
 use crate::units::{real, vector};
 use crate::{json, units};
@@ -9,12 +9,12 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use zmend::Result;
-use zmend::io::{self, Format, InputInfo};
+use zmend::io::{Format, InputInfo};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     let mut code = ExitCode::SUCCESS;
     for (i, path) in args.files.iter().enumerate() {
-        match look(path) {
+        match look(path, args.quick) {
             Ok((info, measured)) if args.json => print::out(&as_json(&info, measured))?,
             Ok((info, measured)) => {
                 let gap = if i > 0 { "\n" } else { "" };
@@ -30,10 +30,9 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     Ok(code)
 }
 
-fn look(path: &Path) -> Result<(InputInfo, Measured)> {
-    let input = io::open(path)?;
-    let measured = Measured::input(&input)?;
-    Ok((input.info().clone(), measured))
+fn look(path: &Path, quick: bool) -> Result<(InputInfo, Measured)> {
+    let file = Loaded::open(path)?;
+    Ok((file.info().clone(), file.measured(quick)))
 }
 
 fn as_json(info: &InputInfo, measured: Measured) -> String {

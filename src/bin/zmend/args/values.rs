@@ -54,6 +54,23 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
     }
 }
 
+/// The greatest distance that is allowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Limit {
+    /// In model units.
+    Length(f64),
+    /// In hundredths of the diagonal of a box.
+    Percent(f64),
+}
+
+/// A length, or a percentage.
+pub(super) fn limit(text: &str) -> Result<Limit, String> {
+    let (number, limit) =
+        text.strip_suffix('%').map_or((text, Limit::Length as fn(f64) -> Limit), |n| (n, Limit::Percent));
+    let number = number.trim().parse().ok().filter(|n| (0.0..f64::INFINITY).contains(n));
+    number.map(limit).ok_or_else(|| "not a length or percentage such as 0.01 or 0.5%".to_owned())
+}
+
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|degrees: &f64| degrees.is_finite()).ok_or_else(|| "not a number of degrees".to_owned())
 }
@@ -89,6 +106,8 @@ mod tests {
         assert_eq!(cell("0.25"), Ok(0.25));
         assert!(["0", "-1", "nan", "inf", "x", "1e-320"].iter().all(|bad| cell(bad).is_err()));
         assert!(coordinate("-1e9").is_ok() && coordinate("inf").is_err());
+        assert_eq!((limit("0.25"), limit("2 %")), (Ok(Limit::Length(0.25)), Ok(Limit::Percent(2.0))));
+        assert!(["", "%", "-1", "nan", "inf%", "1%%", "x"].iter().all(|bad| limit(bad).is_err()));
         assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
     }
 }
