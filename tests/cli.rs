@@ -381,6 +381,54 @@ fn pictures_are_drawn() {
 }
 
 #[test]
+fn octree_files_are_made_and_contoured() {
+    let folder = Folder::new();
+    for format in ["sof", "sog", "dcf"] {
+        folder.run(&format!("repair knot.ply a.{format} -d 6")).ok().says(&["on a grid of 64 cells", "surface cells"]);
+        let json = folder.run(&format!("repair a.{format} b.{format} --json")).ok().json();
+        assert_eq!((&json["input"]["depth"], &json["output"]["format"]), (&6.into(), &format.into()));
+        let (a, b) = (fs::read(folder.path(&format!("a.{format}"))), fs::read(folder.path(&format!("b.{format}"))));
+        assert_eq!(a.unwrap(), b.unwrap());
+        folder.run(&format!("info a.{format}")).ok().says(&["of 64 cells a side", "zmend repair"]);
+        let surface = if format == "sof" { "quads" } else { "dc" };
+        let ran = folder.run(&format!("repair a.{format} {format}.ply -s {surface} --report full --json")).ok();
+        assert_eq!((&ran.json()["output"]["solid"], ran.err.is_empty()), (&true.into(), format != "sof"), "{ran:?}");
+        assert_solid(&folder.path(&format!("{format}.ply")));
+    }
+    // The content says what it is, not the name; SOG files say where they lie.
+    fs::rename(folder.path("a.sog"), folder.path("a.x")).unwrap();
+    folder.run("repair a.x c.stl").ok().says(&["a solid"]);
+    let bounds = |name| io::read(folder.path(name)).unwrap().report().bounds;
+    folder.run("repair knot.ply d.stl -d 6 -q").ok();
+    assert!(bounds("c.stl").min.distance(bounds("d.stl").min) < 0.1);
+    // DCF has normals, SOF has not.
+    folder.run("repair a.dcf c.sof -q").ok();
+    folder.run("repair a.sof c.dcf").fails(&["normals", "SOF"]);
+    folder.run("repair a.sof e.ply -s dc").fails(&["surface", "mc"]);
+    folder.run("repair a.dcf e.ply -d 7").fails(&["depth", "grid of its own"]);
+    folder.run("repair a.dcf e.ply --scale 0.5").fails(&["scale"]);
+    folder.run("sample knot e.sog").fails(&["octree"]);
+    fs::write(folder.path("bad.sof"), [4, 0, 0, 0, 0, 1]).unwrap();
+    folder.run("repair bad.sof e.ply").fails(&["bad.sof", "byte 6"]);
+    assert_eq!(folder.run("info bad.sof knot.ply").code, Some(1));
+    assert!(!folder.names().iter().any(|name| name.starts_with("e.") || name.ends_with("partial")));
+}
+
+#[test]
+fn scenes_come_and_go() {
+    let folder = Folder::new();
+    for format in ["glb", "3mf"] {
+        folder.run(&format!("repair knot.ply a.{format} -d 6 -s quads")).ok().says(&["a solid"]);
+        assert_solid(&folder.path(&format!("a.{format}")));
+        folder.run(&format!("repair a.{format} {format}.ply -d 6")).ok().says(&["a solid"]);
+        let json = folder.run(&format!("info a.{format} --json")).ok().json();
+        assert_eq!((&json["format"], &json["solid"]), (&format.into(), &true.into()));
+    }
+    folder.run("repair knot.ply a.gltf").fails(&["a.gltf", ".glb"]);
+    folder.run("sample knot b.glb").ok();
+}
+
+#[test]
 fn help_has_examples() {
     let folder = Folder::new();
     for command in ["repair", "info", "sample", "render"] {
