@@ -107,7 +107,7 @@ fn samples_are_listed_and_written() {
     folder.run("sample cube gear.stl --force --detail 3").ok();
     assert_eq!(io::read(folder.path("gear.stl")).unwrap().faces.len(), 108);
     folder.run("sample nothing x.ply").fails(&["nothing", "knot-holes"]);
-    folder.run("sample knot x.gltf").fails(&["x.gltf", ".ply"]);
+    folder.run("sample knot x.jpeg").fails(&["x.jpeg", ".ply"]);
     folder.run("sample knot").refused(&["OUT"]);
     folder.run("sample").refused(&["NAME"]);
     folder.run("sample knot x.ply --detail 21").refused(&["detail"]);
@@ -304,7 +304,7 @@ fn errors_name_the_file_and_the_remedy() {
     folder.run("repair dir.ply out.ply").fails(&["dir.ply", "directory"]);
     folder.run("repair knot.ply dir.ply --force").fails(&["dir.ply", "directory"]);
     folder.run("repair knot.ply no/such/out.ply").fails(&["no/such/out.ply", "directory"]);
-    folder.run("repair knot.ply out.gltf").fails(&["out.gltf", ".ply"]);
+    folder.run("repair knot.ply out.jpeg").fails(&["out.jpeg", ".ply"]);
     folder.run("repair knot.ply out").fails(&["out: ", ".ply"]);
     folder.run("repair knot.ply").refused(&["OUT"]);
     folder.run("repair knot.ply a.ply -o b.ply").refused(&["cannot be used with"]);
