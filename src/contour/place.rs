@@ -1,7 +1,7 @@
 //! Where the vertices of dual surfaces go.
 
 use super::dual::Placement;
-use super::layout::{Knot, KnotVertices, Layout};
+use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
 use crate::geom::qef::Qef;
 use crate::grid::brick::{Local, Plane};
@@ -69,13 +69,20 @@ impl Planes {
             self.fill(&cells, layout.octree.crossings(), placement);
         }
         let given = given(layout.octree, brick, placement);
+        let mixed = layout.mixed(brick);
+        let origin = layout.octree.crossings().origin(cells.brick());
+        let side = 1 << layout.octree.crossings().depth();
+        let is_empty = |at: [i32; 3]| {
+            let global: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
+            layout.style == Style::Usual && global.iter().all(|&c| c < side) && !layout.is_mixed(global)
+        };
         let mut creased = Plane::EMPTY;
         let mut knots = layout.knots_of(brick).iter().peekable();
-        layout.mixed(brick).iter().for_each(|cell| {
+        mixed.iter().for_each(|cell| {
             let place = |p| place(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
-                None => self.place_ordinary(cell, placement, given(cell), place),
-                Some(&knot) => self.place_knot(knot, placement, given(cell), layout.of_knots, place),
+                None => self.place_ordinary(cell, placement, given(cell), &is_empty, place),
+                Some(&knot) => self.place_knot(knot, placement, given(cell), layout.style, place),
             };
             if is_creased {
                 creased.set(cell);
@@ -96,7 +103,10 @@ impl Planes {
         let cells = Cells::new(octree, brick);
         self.fill(&cells, octree.crossings(), placement);
         let given = given(octree, brick, placement);
-        cells.mixed().iter().for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &mut place));
+        cells
+            .mixed()
+            .iter()
+            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place));
     }
 
     fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
@@ -124,14 +134,15 @@ impl Planes {
         std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
     }
 
-    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick. Returns whether the cell has
-    /// a crease or corner.
+    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `is_empty` tells of a cell near
+    /// the brick whether it is in the grid and not mixed. Returns whether the cell has a crease or corner.
     #[inline]
     fn place_ordinary(
         &mut self,
         cell: Local,
         placement: Placement<'_>,
         given: Option<Vec3A>,
+        is_empty: &dyn Fn([i32; 3]) -> bool,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
         if placement == Placement::Centre {
@@ -139,7 +150,7 @@ impl Planes {
             return false;
         }
         let sum = self.take_sum(cell);
-        place(given.unwrap_or_else(|| solve(cell, placement, &sum)));
+        place(given.unwrap_or_else(|| solve(cell, placement, &sum, is_empty)));
         is_creased(placement, &sum)
     }
 
@@ -149,11 +160,11 @@ impl Planes {
         Knot { cell, mask }: Knot,
         placement: Placement<'_>,
         given: Option<Vec3A>,
-        vertices: KnotVertices,
+        style: Style,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
         self.take_sum(cell);
-        if vertices == KnotVertices::None {
+        if style == Style::Disjoint {
             return false;
         }
         let case = &CASES[usize::from(mask)];
@@ -174,7 +185,7 @@ impl Planes {
             };
             let mut sum = Qef::EMPTY;
             of_sheet().map(&tangent).for_each(|(p, n)| sum += &Qef::of_plane(p, n));
-            let common = given.unwrap_or_else(|| solve(cell, placement, &sum));
+            let common = given.unwrap_or_else(|| solve(cell, placement, &sum, &|_| false));
             creased |= is_creased(placement, &sum);
             if case.sheets.is_regular(sheet) {
                 let apart = if case.sheets.count > 1 { APART } else { 0.0 };
@@ -221,13 +232,27 @@ fn least_corner(cell: Local) -> Vec3A {
 
 /// Where the vertex of a sheet in a cell goes.
 #[inline]
-fn solve(cell: Local, placement: Placement<'_>, sum: &Qef) -> Vec3A {
+fn solve(cell: Local, placement: Placement<'_>, sum: &Qef, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
     let corner = least_corner(cell);
     let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
-    match placement {
-        _ if placement.needs_normals() && sum.flatness() < FLAT => sum.minimiser_within(low, high),
-        _ => sum.mass_point().clamp(low, high),
+    if !placement.needs_normals() || sum.flatness() >= FLAT {
+        return sum.mass_point().clamp(low, high);
     }
+    let free = sum.minimiser();
+    if free.cmpge(low).all() && free.cmple(high).all() { free } else { solve_outside(low, high, sum, free, is_empty) }
+}
+
+/// The same where the minimiser lies outside of the cell. A crease may bulge through an edge of the grid and back, or a corner through a
+/// face: the crossings cancel, so the cell beyond has no vertex, and the true one belongs there. Such a vertex is drawn to its mass point
+/// a little, for up to four cells may have the same minimiser.
+#[cold]
+fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
+    let beyond = free.floor();
+    let is_near = free.cmpge(low - 1.0).all() && free.cmple(high + 1.0).all();
+    if is_near && is_creased(Placement::SharpFeatures, sum) && is_empty(beyond.to_array().map(|c| c as i32)) {
+        return free.clamp(beyond + CELL_MARGIN, beyond + (1.0 - CELL_MARGIN)).lerp(sum.mass_point(), APART);
+    }
+    sum.minimiser_within(low, high)
 }
 
 fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {

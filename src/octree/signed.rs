@@ -131,6 +131,11 @@ impl SignedOctree {
         SignedOctree::from_crossings(builder.finish())
     }
 
+    /// Crossings and signs, taken apart.
+    pub fn into_parts(self) -> (Crossings, Vec<Plane>) {
+        (self.crossings, self.inside)
+    }
+
     /// The crossed edges.
     pub fn crossings(&self) -> &Crossings {
         &self.crossings

@@ -5,8 +5,10 @@ mod bars;
 mod digits;
 mod goal;
 mod info;
+mod interrupt;
 mod json;
 mod measure;
+mod memory;
 mod octree;
 mod print;
 mod render;
@@ -21,8 +23,13 @@ use zmend::{Error, Result};
 
 fn main() -> ExitCode {
     let args = args::parse();
+    interrupt::listen();
     match run(&args) {
         Ok(code) => code,
+        Err(error @ Error::Cancelled) => {
+            print::error(&error);
+            ExitCode::from(interrupt::EXIT_CODE)
+        }
         Err(error) => {
             print::error(&error);
             ExitCode::FAILURE

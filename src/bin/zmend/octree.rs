@@ -4,9 +4,9 @@ use crate::args::RepairArgs;
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
-use crate::repair::{self, Bounded, after, peak_memory};
+use crate::repair::{self, Bounded, after};
 use crate::summary::surface_name;
-use crate::{digits, json, print, units};
+use crate::{digits, interrupt, json, memory, print, units};
 use serde_json::{Map, Value, json};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -51,19 +51,20 @@ pub(crate) fn run(args: &RepairArgs, from: Option<OctreeFormat>, to: GoalFormat)
     } else {
         let mut input = Bounded::open(&args.input)?;
         let read = start.elapsed();
+        options.max_memory = memory::limit(args.grid.max_memory)?;
         let (solid, report) = solidify(&mut input, &options, &bars)?;
         let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read);
         let times = [("read", read)].into_iter().chain(stages.map(|&(stage, time)| (stage.name(), time))).collect();
         (solid, Source::Mesh(report), times)
     };
     let begun = Instant::now();
-    let (sizes, bytes) = write(args, &solid, &mut options, to, &bars)?;
+    let (sizes, bytes) = interrupt::noted(|| write(args, &solid, &mut options, to, &bars))?;
     times.extend([("write", begun.elapsed()), ("total", start.elapsed())]);
     if args.tell.quiet {
         return Ok(ExitCode::SUCCESS);
     }
     drop(bars);
-    let peak_memory = peak_memory();
+    let peak_memory = memory::peak();
     Outcome { args, to, options, solid, source, sizes, bytes, times, peak_memory }.tell()?;
     Ok(ExitCode::SUCCESS)
 }

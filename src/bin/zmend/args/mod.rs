@@ -3,7 +3,7 @@
 mod repair;
 mod values;
 
-pub(crate) use repair::{RepairArgs, ReportArg};
+pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg};
 
 use repair::GridArgs;
 
