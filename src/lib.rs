@@ -48,7 +48,7 @@
 //! |---|---|
 //! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
 //! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
-//! | [`io`] | STL, PLY, OBJ and OFF |
+//! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`contour`] | marching cubes and manifold dual contouring |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
@@ -79,7 +79,8 @@
 //! # Features
 //!
 //! `cli` (on by default) builds the program `zmend` and brings its dependencies: libraries say `default-features = false`. `render`
-//! (part of `cli`) adds the module `render` and the dependency `png`.
+//! (part of `cli`) adds the module `render` and the dependency `png`; `gltf` and `3mf` (parts of `cli`) add these formats, and the
+//! dependencies `serde_json` for the one, `flate2` and `quick-xml` for the other.
 #![forbid(unsafe_code)]
 
 pub mod contour;

@@ -4,7 +4,8 @@
 use crate::measure::{Crossings, Measured, Side};
 use glam::DVec3;
 use serde_json::{Value, json};
-use zmend::io::InputInfo;
+use zmend::geom::Frame;
+use zmend::io::{InputInfo, OctreeInfo};
 use zmend::mesh::{Bounds, Report};
 
 /// All numbers of a mesh; the same fields whether it was measured or not.
@@ -56,6 +57,33 @@ pub(crate) fn file(info: &InputInfo) -> Value {
         "encoding": info.encoding.to_string(),
         "streamed": info.is_streamed,
         "trailing_bytes": info.trailing_bytes,
+    })
+}
+
+/// What is known of an octree file.
+pub(crate) fn octree_file(info: &OctreeInfo) -> Value {
+    json!({
+        "path": info.path.display().to_string(),
+        "format": info.format.extension(),
+        "bytes": info.bytes,
+        "depth": info.depth,
+        "surface_cells": info.surface_cells,
+        "uniform_surface_cells": info.surface_cells_inside + info.surface_cells_outside,
+        "empty_cells": info.empty_cells,
+        "missing_samples": info.missing_samples,
+        "trailing_bytes": info.trailing_bytes,
+    })
+}
+
+/// Where a grid lies.
+pub(crate) fn grid(frame: &Frame) -> Value {
+    json!({
+        "grid": {
+            "origin": vector(frame.origin()),
+            "size": frame.size(),
+            "cell_size": frame.cell_size(),
+            "cells_a_side": 1u64 << frame.depth(),
+        },
     })
 }
 

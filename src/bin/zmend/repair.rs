@@ -24,9 +24,8 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[&args.input], args.write.force)?;
     let from = OctreeFormat::of_file(&args.input)?;
-    let format = match (from, format) {
-        (None, GoalFormat::Mesh(format)) => format,
-        _ => return octree::run(args, from, format),
+    let (None, GoalFormat::Mesh(format)) = (from, format) else {
+        return octree::run(args, from, format);
     };
     let mut options = options(args);
     if format.has_only_triangles() {

@@ -17,8 +17,8 @@ use values::{degrees, detail_range, size};
 
 /// Repairs polygon meshes: any soup of polygons in, a closed, manifold, oriented surface out.
 ///
-/// Holes are closed, and flipped, doubled, missing and loose faces do not matter. Files are STL, PLY, OBJ or OFF; what they
-/// contain says which, not their names.
+/// Holes are closed, and flipped, doubled, missing and loose faces do not matter. Files are STL, PLY, OBJ, OFF,
+/// glTF, GLB or 3MF; what they contain says which, not their names.
 #[derive(Debug, Parser)]
 #[command(
     name = "zmend",
@@ -76,7 +76,7 @@ The triangles of STL files are taken as connected where their corners are identi
 Self-intersections are pairs of faces that meet anywhere but in common corners and edges: faces that pass through each \
 other, touch, or fold over each other. They are decided exactly, and counted up to a million.")]
 pub(crate) struct InfoArgs {
-    /// Meshes to look at.
+    /// Meshes to look at, or octree files.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Print one JSON object a file, each on its line.
@@ -98,7 +98,7 @@ pub(crate) struct SampleArgs {
     /// Name of the sample.
     #[arg(required_unless_present = "list")]
     pub(crate) name: Option<String>,
-    /// File to write: .stl, .ply, .obj or .off.
+    /// File to write: .stl, .ply, .obj, .off, .glb or .3mf.
     #[arg(value_name = "OUT", required_unless_present = "list")]
     pub(crate) out: Option<PathBuf>,
     /// How fine: the number of triangles grows with the square.
