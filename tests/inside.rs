@@ -63,7 +63,12 @@ fn auto_says_what_it_took_and_why() {
         ("doubled", build("doubled"), Inside::Parity, Reason::Turned),
         ("sieve", sieve(&build("sphere")), Inside::Winding, Reason::Open),
         ("holes", build("knot-holes"), Inside::Winding, Reason::Open),
-        ("some turned, some missing", with_faces(&some_turned, some_turned.faces.iter().skip(9)), Inside::Parity, Reason::OpenAndTurned),
+        (
+            "some turned, some missing",
+            with_faces(&some_turned, some_turned.faces.iter().skip(9)),
+            Inside::Parity,
+            Reason::OpenAndTurned,
+        ),
         ("plate", build("plate"), Inside::Parity, Reason::Sheet),
     ];
     for (what, mesh, rule, reason) in cases {
@@ -154,7 +159,9 @@ fn big_holes_close_smoothly() {
             // In the hole no face is far from level: the angle of a cap there is small.
             let normals = repaired.mesh.faces.iter().filter_map(|face| {
                 let corners: Vec<DVec3> = face.iter().map(|&i| repaired.mesh.points[i as usize]).collect();
-                let within = corners.iter().all(|p| p.reject_from(cap).length() < 0.6 * (1.0 - height * height).sqrt() && p.dot(cap) > 0.0);
+                let within = corners
+                    .iter()
+                    .all(|p| p.reject_from(cap).length() < 0.6 * (1.0 - height * height).sqrt() && p.dot(cap) > 0.0);
                 let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
                 (within && normal.length() > 1e-7).then(|| normal.normalize().dot(cap))
             });
@@ -182,9 +189,10 @@ fn what_runs_out_of_the_grid_is_clipped() {
         }
     }
     // All of the grid but a dent is inside: a cube without its lid, turned inside out, beside a small proper one.
-    let lidless = with_faces(&unit_cube(), unit_cube().faces.iter().filter(|face| {
-        !face.iter().all(|&i| unit_cube().points[i as usize].z == 1.0)
-    }));
+    let lidless = with_faces(
+        &unit_cube(),
+        unit_cube().faces.iter().filter(|face| !face.iter().all(|&i| unit_cube().points[i as usize].z == 1.0)),
+    );
     let options = Options { scale: 0.99, inside: Inside::Winding, ..options(5, Surface::MarchingCubes, Faces::Auto) };
     let repaired = repair(lidless, &options).expect("repairable");
     check_repaired(&repaired).expect("a solid");
