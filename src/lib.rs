@@ -36,7 +36,8 @@
 //!
 //! - **The surface is made anew.** It lies within about a cell of the input, but it shares no vertices with it. What is thinner than a
 //!   cell may vanish or grow together: take a greater [`depth`](Options::depth).
-//! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside.
+//! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside, unless it is
+//!   [thickened](Options::thicken).
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
 //! - **Self-intersections are not prevented.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
@@ -95,13 +96,16 @@ pub mod progress;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod repair;
+mod sets;
 pub mod sign;
 
 pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
 pub use glam;
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Faces, Inside, Options, RepairReport, Repaired, Solid, Surface, repair, repair_into, solidify};
+pub use repair::{
+    Faces, Inside, Keep, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into, solidify,
+};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

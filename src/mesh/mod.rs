@@ -7,7 +7,6 @@ mod meet;
 mod polygon;
 mod report;
 pub mod sample;
-mod sets;
 mod source;
 mod star;
 mod stream;

@@ -22,6 +22,7 @@
 
 pub(crate) mod cells;
 pub mod compact;
+pub mod components;
 pub mod crossings;
 pub mod hits;
 mod locate;
@@ -29,6 +30,7 @@ mod neighbour;
 #[cfg(test)]
 mod oracle;
 pub mod points;
+pub mod regions;
 pub mod segments;
 pub mod signed;
 mod traverse;
