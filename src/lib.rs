@@ -40,16 +40,16 @@
 //!   [thickened](Options::thicken).
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
-//!   through each other here and there, mostly at creases and in walls thinner than a cell.
+//! - **Self-intersections are not prevented.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
+//!   through each other here and there, mostly at creases and in walls thinner than a cell. [`Mesh::self_intersections`] finds them.
 //!
 //! # Where to find what
 //!
 //! | module | what it does |
 //! |---|---|
 //! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
-//! | [`mesh`] | [`Mesh`], reports and validation, sources and sinks of meshes that pass by, broken samples to try |
-//! | [`io`] | STL, PLY, OBJ and OFF |
+//! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
+//! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`contour`] | marching cubes and manifold dual contouring |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
@@ -80,7 +80,8 @@
 //! # Features
 //!
 //! `cli` (on by default) builds the program `zmend` and brings its dependencies: libraries say `default-features = false`. `render`
-//! (part of `cli`) adds the module `render` and the dependency `png`.
+//! (part of `cli`) adds the module `render` and the dependency `png`; `gltf` and `3mf` (parts of `cli`) add these formats, and the
+//! dependencies `serde_json` for the one, `flate2` and `quick-xml` for the other.
 #![forbid(unsafe_code)]
 
 pub mod contour;
@@ -102,7 +103,9 @@ pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
 pub use glam;
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Faces, Inside, Keep, Options, RepairReport, Repaired, Surface, Thicken, repair, repair_into};
+pub use repair::{
+    Faces, Inside, Keep, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into, solidify,
+};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

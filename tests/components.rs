@@ -8,7 +8,7 @@ use proptest::test_runner::RngSeed;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use zmend::Mesh;
-use zmend::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
+use zmend::contour::{DualOptions, Intersections, Placement, dual_contouring, marching_cubes};
 use zmend::geom::Frame;
 use zmend::glam::DVec3;
 use zmend::grid::Key;
@@ -155,7 +155,8 @@ fn surfaces(octree: &SignedOctree) -> Vec<Mesh> {
     let frame = Frame::new(DVec3::ZERO, 1.0, DEPTH).expect("a frame");
     let (mut mc, mut dc) = (Mesh::default(), Mesh::default());
     marching_cubes(octree, &frame, &mut mc, &Silent).expect("in memory");
-    let options = DualOptions { placement: Placement::MassPoint, triangles: false };
+    let options =
+        DualOptions { placement: Placement::MassPoint, triangles: false, intersections: Intersections::Allow };
     dual_contouring(octree, &frame, &options, &mut dc, &Silent).expect("in memory");
     vec![mc, dc]
 }

@@ -170,7 +170,7 @@ fn oriented_hits_have_the_parity_of_the_plain_scan() {
             assert_eq!(oriented.hits.validate(), Ok(()), "{name}");
             assert_eq!(oriented.hits.len() as u64, oriented.counts.hits, "{name}");
             several += oriented.hits.len() - oriented.hits.edges().len();
-            let parity = oriented.parity();
+            let parity = oriented.parity(&Silent).unwrap();
             assert_eq!(parity.counts, plain.counts, "{name}");
             assert_same(name, &parity.crossings, &plain.crossings);
         }

@@ -10,10 +10,11 @@
 //!
 //! Cost: that of [`Regions`], some 3 us a brick, and about 0.5 us a brick to measure them; independent of the volume.
 
-use super::crossings::{Brick, Crossings};
+use super::cells::Cells;
+use super::crossings::{Brick, Builder, Crossings};
 use super::regions::Regions;
 use super::signed::SignedOctree;
-use crate::grid::brick::{Local, Plane};
+use crate::grid::brick::Plane;
 use crate::grid::{Axis, Face, Key};
 use crate::parallel::pieces;
 use rayon::prelude::*;
@@ -144,7 +145,7 @@ impl<'a> Components<'a> {
             }
             kept
         };
-        SignedOctree::from_crossings(crossings.retained(kept))
+        SignedOctree::from_crossings(retained(crossings, kept))
     }
 }
 
@@ -154,45 +155,40 @@ fn higher(crossings: &Crossings, brick: &Brick) -> [Result<usize, Option<Key>>; 
     Axis::ALL.map(|axis| places[axis.index()].ok_or_else(|| brick.key.neighbour(Face::new(axis, true))))
 }
 
-/// The pairs of outside points of a brick's cells that no edge of the cell joins: across faces whose four edges are all crossed, and across
-/// cells that are otherwise inside.
+/// The pairs of outside points of a brick's cells that no edge need join: all outside corners of a cell hang together. In cells that are
+/// not knotty, edges join them.
 fn diagonals(octree: &SignedOctree, i: usize, join: &mut dyn FnMut([[u32; 3]; 2])) {
-    let crossings = octree.crossings();
-    let brick = &crossings.bricks()[i];
-    let [x, y, z] = &brick.crossed;
-    let [px, py, pz, pxy, ..] = crossings.plus(brick).map(|b| &b.crossed);
-    let (y_at_x, x_at_y) = (y.at_plus_x(&px[1]), x.at_plus_y(&py[0]));
-    let (z_at_x, x_at_z) = (z.at_plus_x(&px[2]), x.at_plus_z(&pz[0]));
-    let (z_at_y, y_at_z) = (z.at_plus_y(&py[2]), y.at_plus_z(&pz[1]));
-    let origin = crossings.origin(brick);
-    let inside = &octree.inside()[i];
-    let mut pair = |p: Local, from: [u32; 3], to: [u32; 3]| {
-        let c = p.coords();
-        join([from, to].map(|step| std::array::from_fn(|a| origin[a] + c[a] + step[a])));
-    };
-    let faces =
-        [(*x & *y & y_at_x & x_at_y, [0, 1]), (*x & *z & z_at_x & x_at_z, [0, 2]), (*y & *z & z_at_y & y_at_z, [1, 2])];
-    for (ambiguous, axes) in faces {
-        let [u, v] = axes.map(|a| std::array::from_fn(|b| u32::from(a == b)));
-        for p in ambiguous.iter() {
-            if inside.get(p) {
-                pair(p, u, v);
-            } else {
-                pair(p, [0; 3], std::array::from_fn(|a| u[a] | v[a]));
+    let cells = Cells::new(octree, i);
+    let origin = octree.crossings().origin(cells.brick());
+    for cell in cells.knotty().iter() {
+        let (c, mask) = (cell.coords(), cells.mask(cell));
+        let point = |k: u32| std::array::from_fn(|a| origin[a] + c[a] + (k >> (2 - a) & 1));
+        let mut outside = (0..8).filter(|k| mask >> k & 1 == 0).map(point);
+        let first = outside.next().expect("a knotty cell is mixed");
+        outside.for_each(|other| join([first, other]));
+    }
+}
+
+/// The crossings that `kept` names for each brick: none that is not there.
+fn retained(crossings: &Crossings, kept: impl Fn(usize) -> [Plane; 3] + Sync + Send) -> Crossings {
+    let planes: Vec<[Plane; 3]> = (0..crossings.bricks().len()).into_par_iter().map(kept).collect();
+    let mut builder = Builder::new(crossings.depth(), crossings.with_normals());
+    let (mut offsets, mut normals) = (Vec::new(), Vec::new());
+    for (brick, kept) in crossings.bricks().iter().zip(planes) {
+        let mut place = brick.first as usize;
+        for (crossed, kept) in brick.crossed.iter().zip(&kept) {
+            for local in crossed.iter() {
+                if kept.get(local) {
+                    let sample = crossings.sample_at(place);
+                    offsets.push(sample.offset);
+                    normals.push(sample.normal);
+                }
+                place += 1;
             }
         }
+        builder.push(brick.key, kept, &offsets, &normals);
+        offsets.clear();
+        normals.clear();
     }
-    // The other corners of the cells, as far as some corner at its ends is outside and the three next to it are inside.
-    let c0 = *inside;
-    let (c1, c2, c4) = (c0 ^ *z, c0 ^ *y, c0 ^ *x);
-    let (c3, c5, c6) = (c2 ^ z_at_y, c4 ^ z_at_x, c4 ^ y_at_x);
-    let c7 = c6 ^ z_at_x.at_plus_y(&py[2].at_plus_x(&pxy[2]));
-    let all = [c0, c1, c2, c3, c4, c5, c6, c7];
-    for low in 0..4 {
-        let others = (0..8).filter(|&c| c != low && c != 7 - low).fold(Plane::FULL, |a, c| a & all[c]);
-        for p in (others & !(all[low] | all[7 - low])).iter() {
-            let corner = |c: usize| [c as u32 >> 2, c as u32 >> 1 & 1, c as u32 & 1];
-            pair(p, corner(low), corner(7 - low));
-        }
-    }
+    builder.finish()
 }

@@ -21,8 +21,10 @@
 //! for each of these. A byte a brick says how its hits are turned; where all agree, and they mostly do, nobody looks at single bits.
 
 use super::crossings::{Brick, Builder, Crossings, Sample};
+use crate::error::Result;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
+use crate::progress::{Progress, Silent};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -294,19 +296,38 @@ impl HitsBuilder {
         self.leaves.append(&batch.leaves);
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.edges.bytes()
+            + self.leaves.words.capacity() * size_of::<u64>()
+            + self.several.capacity() * size_of::<Several>()
+            + self.hits.capacity() * size_of::<EdgeHit>()
+    }
+
     /// Adds what the invariants of [`Crossings`] ask for.
     ///
     /// # Panics
     /// When there are not as many orientations as edges.
     pub fn finish(self) -> OrientedHits {
-        let edges = self.edges.finish();
+        self.finish_within(&Silent).expect("nothing is refused or cancelled")
+    }
+
+    /// The same, within the memory that `progress` allows.
+    ///
+    /// # Errors
+    /// Whatever [`Progress::hold`] returns.
+    ///
+    /// # Panics
+    /// When there are not as many orientations as edges.
+    pub fn finish_within(self, progress: &dyn Progress) -> Result<OrientedHits> {
+        let edges = self.edges.finish_within(progress)?;
         assert_eq!(self.leaves.len, edges.len(), "one orientation an edge");
         let HitsBuilder { leaves, several, hits, .. } = self;
         let turns = Vec::new();
         let mut made = OrientedHits { edges, leaves, several, hits, turns };
         made.turns =
             (0..made.edges.bricks().len()).into_par_iter().map(|i| made.find_turns(&made.edges.bricks()[i])).collect();
-        made
+        Ok(made)
     }
 }
 

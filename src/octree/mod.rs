@@ -20,6 +20,8 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+pub(crate) mod cells;
+pub mod compact;
 pub mod components;
 pub mod crossings;
 pub mod hits;
@@ -27,7 +29,8 @@ mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
-pub(crate) mod points;
+pub(crate) mod point_set;
+pub mod points;
 pub mod regions;
 pub mod segments;
 pub mod signed;
@@ -43,9 +46,11 @@ use hashbrown::hash_map::Entry;
 use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
+pub use compact::CompactOctree;
 pub use crossings::Crossings;
 pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
+pub use points::{CellPoints, StoredPoints};
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
 pub use validate::Violation;

@@ -1,84 +1,101 @@
-//! Sets of lattice points or cells, a plane a brick.
+//! One point in each cell that the surface crosses: what dual contouring makes and SOG files hold.
+//!
+//! Points are in model units and in single precision, as the files have them, so that what was read is written again bit by bit.
+//! [`StoredPoints`] costs 12 bytes a cell and 80 a brick.
 
-use super::LinearOctree;
+use super::SignedOctree;
+use super::segments::Segments;
+use crate::grid::Key;
 use crate::grid::brick::{Local, Plane};
-use crate::grid::{Axis, Face, Key};
 
-/// Some of the points (or of the cells, each by its least corner) of a grid with 2^depth cells a side. Bricks without any are not held.
-///
-/// Cost: 64 bytes a brick and its entry in a hash map.
-#[derive(Debug, Clone)]
-pub(crate) struct PointSet {
-    depth: u32,
-    planes: LinearOctree<Plane>,
+/// A point in each mixed cell (one with corners of both signs) of an octree, made or looked up when asked for.
+pub trait CellPoints: Sync {
+    /// Appends the points of all mixed cells of some bricks, given by their numbers in ascending order: brick by brick, in the order
+    /// of [`Local`].
+    fn of_bricks(&self, octree: &SignedOctree, bricks: &[u32], points: &mut Vec<[f32; 3]>);
 }
 
-impl PointSet {
-    /// The points of some bricks; of a brick that occurs several times, the last ones.
-    pub(crate) fn new(depth: u32, bricks: impl IntoIterator<Item = (Key, Plane)>) -> Self {
-        let planes = bricks.into_iter().filter(|(_, plane)| !plane.is_empty()).collect();
-        PointSet { depth, planes }
+/// Points of cells, held in memory.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StoredPoints {
+    bricks: Vec<StoredBrick>,
+    points: Segments<[f32; 3], 12>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct StoredBrick {
+    key: Key,
+    /// The cells that have a point.
+    cells: Plane,
+    /// Points of all bricks before.
+    first: usize,
+}
+
+impl StoredPoints {
+    /// Appends a brick with a point for each set bit of `cells`.
+    ///
+    /// # Panics
+    /// When bricks do not come in ascending order, or the numbers do not agree.
+    pub fn push(&mut self, key: Key, cells: Plane, points: &[[f32; 3]]) {
+        assert!(self.bricks.last().is_none_or(|last| last.key < key), "bricks come in order");
+        assert_eq!(cells.count() as usize, points.len(), "one point a cell");
+        self.bricks.push(StoredBrick { key, cells, first: self.points.len() });
+        self.points.extend_from_slice(points);
     }
 
-    /// Whether a point is in the set; none outside of the root is. Cost: a hash probe.
-    pub(crate) fn contains(&self, at: [u32; 3]) -> bool {
-        let key = Key::cell(self.depth - 3, at.map(|c| c >> 3));
-        key.is_some_and(|key| self.plane(key).get(Local::new(at[0], at[1], at[2])))
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
     }
 
-    /// The points of a brick that are in the set.
-    pub(crate) fn plane(&self, brick: Key) -> Plane {
-        self.planes.get(brick).copied().unwrap_or(Plane::EMPTY)
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
     }
 
-    /// The points that are at most one step away along each axis. Cost: nine hash probes a brick.
-    #[must_use]
-    pub(crate) fn dilated(&self) -> Self {
-        let mut set = self.clone();
-        for axis in Axis::ALL {
-            let beside = |key: Key, up| key.neighbour(Face::new(axis, up));
-            let mut planes = LinearOctree::with_capacity(set.planes.len());
-            let keys = set.planes.keys_z().into_iter();
-            for key in keys.flat_map(|key| [Some(key), beside(key, false), beside(key, true)]).flatten() {
-                if planes.contains(key) {
-                    continue;
-                }
-                let at = |key: Option<Key>| key.map_or(Plane::EMPTY, |key| set.plane(key));
-                let (here, below, above) = (set.plane(key), at(beside(key, false)), at(beside(key, true)));
-                let all = here | here.at_plus(axis, &above) | here.at_minus(axis, &below);
-                if !all.is_empty() {
-                    planes.insert(key, all);
-                }
-            }
-            set.planes = planes;
-        }
-        set
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.bricks.capacity() * size_of::<StoredBrick>() + self.points.allocated_bytes()
+    }
+
+    /// The points of a brick. Cost: a binary search.
+    pub fn of_brick(&self, key: Key) -> Option<PointsOfBrick<'_>> {
+        let i = self.bricks.binary_search_by_key(&key, |brick| brick.key).ok()?;
+        Some(PointsOfBrick { brick: &self.bricks[i], points: &self.points })
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
+/// The points of the cells of one brick.
+#[derive(Debug, Clone, Copy)]
+pub struct PointsOfBrick<'a> {
+    brick: &'a StoredBrick,
+    points: &'a Segments<[f32; 3], 12>,
+}
 
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(32))]
-        #[test]
-        fn dilating_adds_all_neighbours(points in prop::collection::vec(prop::array::uniform3(0u32..32), 0..40)) {
-            let mut planes = std::collections::BTreeMap::new();
-            for &[x, y, z] in &points {
-                let key = Key::cell(2, [x >> 3, y >> 3, z >> 3]).expect("in the root");
-                planes.entry(key).or_insert(Plane::EMPTY).set(Local::new(x, y, z));
-            }
-            let set = PointSet::new(5, planes);
-            let dilated = set.dilated();
-            for at in (0..32u32.pow(3)).map(|i| [i >> 10, i >> 5 & 31, i & 31]) {
-                let distance = |p: &[u32; 3]| (0..3).map(|a| p[a].abs_diff(at[a])).max().expect("three axes");
-                let nearest = points.iter().map(distance).min();
-                prop_assert_eq!(set.contains(at), nearest == Some(0));
-                prop_assert_eq!(dilated.contains(at), nearest.is_some_and(|d| d <= 1), "{:?}", at);
-            }
-            prop_assert!(!dilated.contains([32, 0, 0]));
+impl PointsOfBrick<'_> {
+    /// The point of a cell, if it has one.
+    #[inline]
+    pub fn get(&self, cell: Local) -> Option<[f32; 3]> {
+        let StoredBrick { cells, first, .. } = self.brick;
+        cells.get(cell).then(|| self.points[first + cells.rank(cell) as usize])
+    }
+}
+
+impl<P: CellPoints> CellPoints for &P {
+    fn of_bricks(&self, octree: &SignedOctree, bricks: &[u32], points: &mut Vec<[f32; 3]>) {
+        (**self).of_bricks(octree, bricks, points);
+    }
+}
+
+impl CellPoints for StoredPoints {
+    /// # Panics
+    /// When a mixed cell has no point, as when the points are those of another octree.
+    fn of_bricks(&self, octree: &SignedOctree, bricks: &[u32], points: &mut Vec<[f32; 3]>) {
+        for &i in bricks {
+            let mixed = octree.mixed_cells(i as usize);
+            let stored = self.of_brick(octree.crossings().bricks()[i as usize].key);
+            let point = |cell| stored.and_then(|stored| stored.get(cell)).expect("every mixed cell has a point");
+            points.extend(mixed.iter().map(point));
         }
     }
 }

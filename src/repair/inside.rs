@@ -91,11 +91,11 @@ pub(super) fn tell(
     }
     let asked = inside == Inside::Winding;
     if !asked && let Some(reason) = distrust(&boundary) {
-        return by_parity(clock.time(Stage::Scan, || scan.parity()), reason, clock, progress);
+        return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, reason, clock, progress);
     }
     let patches = clock.time(Stage::Close, || Patches::new(&scan.hits, &boundary, progress))?;
     if !asked && is_sheet(&patches, scan.hits.len()) {
-        return by_parity(clock.time(Stage::Scan, || scan.parity()), Reason::Sheet, clock, progress);
+        return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, Reason::Sheet, clock, progress);
     }
     let odd_faces = boundary.iter().filter(|c| is_rim(c)).count() as u64;
     let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.area(), vanished: 0 };
@@ -125,7 +125,7 @@ fn without_boundary(scan: OrientedScan, inside: Inside, clock: &mut Clock, progr
         Inside::Auto if numbers.overlap() => (Inside::Winding, Reason::Overlaps),
         // Pairs of coincident walls are not looked into by winding numbers.
         Inside::Auto if !scan.hits.are_single() => {
-            return by_parity(clock.time(Stage::Scan, || scan.parity()), Reason::Sound, clock, progress);
+            return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, Reason::Sound, clock, progress);
         }
         Inside::Auto => (Inside::Parity, Reason::Sound),
         rule => (rule, Reason::Asked),

@@ -2,22 +2,24 @@
 
 mod hull;
 mod inside;
+mod memory;
 mod options;
 mod report;
+mod solid;
 
 pub use crate::sign::{Keep, Kept, Thicken};
 pub use inside::{InsideChoice, Reason};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
+pub use solid::Solid;
 
-use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
 use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
-use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
 use crate::sign::{check_gap, check_width, keep, thicken};
 use inside::{Told, tell};
+use memory::{Guard, GuardedSink};
 use report::Clock;
 
 /// A repaired mesh and how it came about.
@@ -51,25 +53,76 @@ pub fn repair(mut mesh: Mesh, options: &Options) -> Result<Repaired> {
 
 /// Repairs whatever `source` yields and passes the result to `sink` as it is made: neither mesh need be in memory.
 ///
-/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)).
+/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)), and what the
+/// sink holds.
 ///
 /// # Errors
-/// When an option is out of range, when source or sink fail, and `Cancelled`.
+/// When an option is out of range, when the input does not fit into the given cube or needs more memory than may be taken, when source or
+/// sink fail, and `Cancelled`.
 pub fn repair_into(
     source: &mut dyn TriangleSource,
     options: &Options,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<RepairReport> {
-    let mut clock = Clock::default();
-    progress.begin(Stage::Read, 0);
-    let bounds = clock.time(Stage::Read, || source.bounds())?;
+    let begun = Begun::new(source, options, progress)?;
+    let (frame, guard) = (begun.frame, Guard::new(progress, options));
+    let report = mend(source, begun, options, &guard).and_then(|(solid, mut report)| {
+        let mut clock = Clock::default();
+        let mut guarded = GuardedSink { sink, guard: &guard };
+        report.sizes = clock.time(Stage::Contour, || solid.extract(options, &mut guarded, &guard))?;
+        report.times.append(&mut clock.times);
+        Ok(report)
+    });
+    report.map_err(|error| guard.explain(error, source, Some(sink), &frame, options))
+}
+
+/// Repairs whatever `source` yields, but extracts no surface: the solid can be written as an octree file or be extracted in several ways.
+/// The report's sizes are those of no mesh. Crossings have normals if [`Surface::needs_normals`] of the options' surface says so.
+///
+/// # Errors
+/// As [`repair_into`].
+pub fn solidify(
+    source: &mut dyn TriangleSource,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<(Solid, RepairReport)> {
+    let begun = Begun::new(source, options, progress)?;
+    let (frame, guard) = (begun.frame, Guard::new(progress, options));
+    mend(source, begun, options, &guard).map_err(|error| guard.explain(error, source, None, &frame, options))
+}
+
+/// A repair of which the extent is known.
+struct Begun {
+    bounds: Bounds,
+    frame: Frame,
+    clock: Clock,
+}
+
+impl Begun {
+    fn new(source: &mut dyn TriangleSource, options: &Options, progress: &dyn Progress) -> Result<Self> {
+        let mut clock = Clock::default();
+        progress.begin(Stage::Read, 0);
+        let bounds = clock.time(Stage::Read, || source.bounds())?;
+        let frame = options.frame(&bounds)?;
+        check(options, &frame)?;
+        Ok(Begun { bounds, frame, clock })
+    }
+}
+
+/// The stages between reading and contouring.
+fn mend(
+    source: &mut dyn TriangleSource,
+    Begun { bounds, frame, mut clock }: Begun,
+    options: &Options,
+    guard: &Guard<'_>,
+) -> Result<(Solid, RepairReport)> {
+    let progress: &dyn Progress = guard;
+    guard.check_source(source, &frame)?;
     let mut warnings = Vec::new();
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let frame = Frame::fit(&grown(nonempty(bounds), options), options.depth, options.scale)?;
-    check(options, &frame)?;
     let told = match options.inside {
         Inside::Hull => hull::tell(source, &frame, options, &mut clock, progress)?,
         rule => tell(source, &frame, options.surface.needs_normals(), rule, &mut clock, progress)?,
@@ -79,20 +132,20 @@ pub fn repair_into(
         octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
     }
     let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
-    let sizes = clock.time(Stage::Contour, || extract(&octree, &frame, options, sink, progress))?;
 
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
     }
     let noted = [
-        (counts.skipped_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.skipped_triangles - counts.outside_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.outside_triangles, Warning::OutsideTriangles),
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
         (clipped, Warning::Clipped),
         (if options.thicken.is_none() { percent(vanished, counts.hits) } else { 0 }, Warning::FacesVanished),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
-    Ok(RepairReport {
+    let report = RepairReport {
         bounds,
         frame,
         scan: counts,
@@ -104,31 +157,11 @@ pub fn repair_into(
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
         volume: octree.volume() * frame.cell_size().powi(3),
-        sizes,
+        sizes: MeshSizes::default(),
         warnings,
         times: clock.times,
-    })
-}
-
-/// Extracts the surface that the options ask for.
-fn extract(
-    octree: &SignedOctree,
-    frame: &Frame,
-    options: &Options,
-    sink: &mut (dyn MeshSink + Send),
-    progress: &dyn Progress,
-) -> Result<MeshSizes> {
-    let placement = match options.surface {
-        Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
-        Surface::DualContouring => Placement::SharpFeatures,
-        Surface::Quads => Placement::MassPoint,
     };
-    let triangles = match options.faces {
-        Faces::Auto => options.surface != Surface::Quads,
-        Faces::Triangles => true,
-        Faces::Polygons => false,
-    };
-    dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
+    Ok((Solid { octree, frame, points: None }, report))
 }
 
 /// Refuses what can be told before anything is read.
@@ -143,21 +176,7 @@ fn check(options: &Options, frame: &Frame) -> Result<()> {
     options.thicken.map_or(Ok(()), |width| check_width(width, frame))
 }
 
-/// Room for walls and for what closes gaps.
-fn grown(mut bounds: Bounds, options: &Options) -> Bounds {
-    let room = |width: Option<f64>| width.filter(|w| w.is_finite() && *w > 0.0).unwrap_or(0.0);
-    let margin = 0.5 * room(options.thicken).max(room(options.gap));
-    bounds.min -= margin;
-    bounds.max += margin;
-    bounds
-}
-
 /// So many in a hundred, rounded.
 fn percent(part: u64, whole: u64) -> u64 {
     (100 * part + whole / 2).checked_div(whole).unwrap_or(0)
-}
-
-/// An input without faces gets the unit cube: all checks of options apply, and the result is empty.
-fn nonempty(bounds: Bounds) -> Bounds {
-    if bounds.is_empty() { Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE } } else { bounds }
 }

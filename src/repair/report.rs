@@ -52,6 +52,8 @@ pub enum Warning {
     NothingEnclosed,
     /// So many triangles had corners that are not finite and were left out.
     SkippedTriangles(u64),
+    /// So many triangles were left out because they reach out of the grid, although the source's bounds did not say so.
+    OutsideTriangles(u64),
     /// The input has holes, and so many rings of cells were filled.
     HolesClosed(u64),
     /// About so many percent of the surface bound no solid and vanished.
@@ -76,6 +78,8 @@ impl fmt::Display for Warning {
             Warning::SkippedTriangles(n) => {
                 write!(f, "{n} triangles with coordinates that are not finite were left out")
             }
+            Warning::OutsideTriangles(1) => write!(f, "a triangle that reaches out of the grid was left out"),
+            Warning::OutsideTriangles(n) => write!(f, "{n} triangles that reach out of the grid were left out"),
             Warning::HolesClosed(1) => write!(f, "the surface was open: a hole was closed"),
             Warning::HolesClosed(n) => write!(f, "the surface was open: {n} holes, as the grid sees them, were closed"),
             Warning::Clipped(n) => write!(

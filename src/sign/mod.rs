@@ -20,5 +20,5 @@ pub use close::{Closing, close};
 pub use hull::{hull, hull_with_gap};
 pub use keep::{Keep, Kept, keep};
 pub use parity::parity_signs;
-pub use scan::{OrientedScan, Scan, ScanCounts, scan, scan_oriented};
+pub use scan::{OrientedScan, Scan, ScanCounts, expected_hits, scan, scan_oriented};
 pub use thicken::{Thicken, check_gap, check_width, thicken, vanished};

@@ -14,15 +14,15 @@
 //! Cost: about 20 ns a hit in all; 8 bytes a hit until its block is resolved, then 2 or 4 (see
 //! [`Crossings`]). The triangles are not kept. Orientations cost 1 ns and a bit a hit.
 
-use super::hits::{BlockCoords, Bucket, Hit, HitSorter, brick_coords, sort_hits};
+use super::hits::{BlockCoords, Bucket, Hit, HitSorter, Ledger, brick_coords, sort_hits};
 use super::walls;
 use crate::error::Result;
 use crate::geom::Frame;
-use crate::geom::raster::{FineTriangle, rasterise};
+use crate::geom::raster::{FineTriangle, Hits, rasterise};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
 use crate::mesh::{SourceCounts, TriangleSource};
-use crate::octree::crossings::{Brick, Builder, Crossings, Sample, Toggle, finest_element};
+use crate::octree::crossings::{self, Brick, Builder, Crossings, Sample, Toggle, finest_element};
 use crate::octree::hits::{EdgeHit, HitBatch, HitsBuilder, OrientedHits};
 use crate::parallel::in_order;
 use crate::progress::{Progress, Stage, check};
@@ -47,6 +47,8 @@ pub struct ScanCounts {
     pub source: SourceCounts,
     /// Triangles left out because a corner is not finite or lies outside of the root cube.
     pub skipped_triangles: u64,
+    /// Those of them whose corners are finite.
+    pub outside_triangles: u64,
     /// Crossings of triangles with lattice edges.
     pub hits: u64,
     /// Edges on which coincident walls, such as duplicate faces, were counted as one.
@@ -68,26 +70,26 @@ pub struct OrientedScan {
 /// Finds all crossings of the source's triangles with the edges of the finest grid of `frame`.
 ///
 /// # Errors
-/// Whatever the source returns, and `Cancelled`.
+/// Whatever the source returns, `Cancelled`, `Memory` when `progress` says so, and when more than 2^32 edges are crossed.
 pub fn scan(
     source: &mut dyn TriangleSource,
     frame: &Frame,
     with_normals: bool,
     progress: &dyn Progress,
 ) -> Result<Scan> {
-    let (blocks, mut counts) = collect(source, frame, with_normals, progress)?;
+    let (hits, mut counts) = collect(source, frame, with_normals, progress)?;
     let mut builder = Builder::new(frame.depth(), with_normals);
     let mut merges = Vec::new();
     let push = |block: Resolved| {
+        crossings::check_count(builder.len() as u64 + block.offsets.len() as u64)?;
         block.for_bricks(with_normals, |key, crossed, offsets, normals| builder.push(key, crossed, offsets, normals));
         merges.extend(block.merges);
         counts.hits += block.hits;
+        Ok((builder.bytes() + merges.capacity() * size_of::<Toggle>()) as u64)
     };
-    resolve::<false>(blocks, frame.depth(), with_normals, progress, push)?;
-    let crossings = builder.finish();
-    let merges = walls::worth_merging(&crossings, merges);
-    counts.merged_walls = merges.len() as u64;
-    Ok(Scan { crossings: crossings.toggled(merges), counts })
+    resolve::<false>(hits, frame.depth(), with_normals, progress, push)?;
+    let crossings = builder.finish_within(progress)?;
+    merged(crossings, merges, counts, progress)
 }
 
 /// The same, but keeps all hits and their orientations.
@@ -100,21 +102,26 @@ pub fn scan_oriented(
     with_normals: bool,
     progress: &dyn Progress,
 ) -> Result<OrientedScan> {
-    let (blocks, mut counts) = collect(source, frame, with_normals, progress)?;
+    let (hits, mut counts) = collect(source, frame, with_normals, progress)?;
     let mut builder = HitsBuilder::new(frame.depth(), with_normals);
     let push = |block: Resolved| {
+        crossings::check_count(counts.hits + block.hits)?;
         block.for_bricks(with_normals, |key, hit, offsets, normals| builder.push(key, hit, offsets, normals));
         builder.append(&block.oriented);
         counts.hits += block.hits;
+        Ok(builder.bytes() as u64)
     };
-    resolve::<true>(blocks, frame.depth(), with_normals, progress, push)?;
-    Ok(OrientedScan { hits: builder.finish(), counts })
+    resolve::<true>(hits, frame.depth(), with_normals, progress, push)?;
+    Ok(OrientedScan { hits: builder.finish_within(progress)?, counts })
 }
 
 impl OrientedScan {
     /// What [`scan`] makes of the same source. Cost: none if no edge has several hits; else linear.
-    pub fn parity(self) -> Scan {
-        let OrientedScan { hits, mut counts } = self;
+    ///
+    /// # Errors
+    /// Whatever [`Progress::hold`] returns.
+    pub fn parity(self, progress: &dyn Progress) -> Result<Scan> {
+        let OrientedScan { hits, counts } = self;
         let (mut even, mut merges) = (Vec::new(), Vec::new());
         for brick in hits.edges().bricks().iter().filter(|_| !hits.are_single()) {
             for (axis, local, of_edge) in hits.several_in(brick) {
@@ -127,11 +134,17 @@ impl OrientedScan {
                 }
             }
         }
-        let crossings = hits.into_edges().toggled(even);
-        let merges = walls::worth_merging(&crossings, merges);
-        counts.merged_walls = merges.len() as u64;
-        Scan { crossings: crossings.toggled(merges), counts }
+        let crossings = hits.into_edges().toggled_within(even, progress)?;
+        merged(crossings, merges, counts, progress)
     }
+}
+
+/// The scan of crossings of which coincident walls are counted as one where that is better.
+fn merged(crossings: Crossings, merges: Vec<Toggle>, mut counts: ScanCounts, progress: &dyn Progress) -> Result<Scan> {
+    progress.hold((crossings.bytes() + merges.len() * walls::BYTES) as u64)?;
+    let merges = walls::worth_merging(&crossings, merges);
+    counts.merged_walls = merges.len() as u64;
+    Ok(Scan { crossings: crossings.toggled_within(merges, progress)?, counts })
 }
 
 /// The switch of a crossed edge.
@@ -144,36 +157,79 @@ fn toggle_of(crossings: &Crossings, brick: &Brick, axis: Axis, local: Local) -> 
 /// Hits by block.
 type Blocks = Vec<(BlockCoords, Vec<Bucket>)>;
 
+/// All hits, and the bytes that they take.
+struct Collected {
+    blocks: Blocks,
+    held: u64,
+}
+
 /// Rasterises all triangles.
 fn collect(
     source: &mut dyn TriangleSource,
     frame: &Frame,
     with_normals: bool,
     progress: &dyn Progress,
-) -> Result<(Blocks, ScanCounts)> {
+) -> Result<(Collected, ScanCounts)> {
     progress.begin(Stage::Scan, source.size_hint().unwrap_or(0));
-    let sorters: Vec<_> = (0..rayon::current_num_threads()).map(|_| Mutex::new(HitSorter::new(with_normals))).collect();
-    let skipped = AtomicU64::new(0);
+    let ledger = Ledger::new(progress);
+    let sorters: Vec<_> =
+        (0..rayon::current_num_threads()).map(|_| Mutex::new(HitSorter::new(&ledger, with_normals))).collect();
+    let [skipped, outside] = [const { AtomicU64::new(0) }; 2];
     let counts = source.triangles(&mut |batch| {
         check(progress)?;
         let task = batch.len().div_ceil(4 * sorters.len()).clamp(1, TASK);
         batch.par_chunks(task).for_each(|triangles| {
             let thread = rayon::current_thread_index().unwrap_or(0) % sorters.len();
             let mut sorter = sorters[thread].lock().expect("rasterising does not panic");
-            let done = triangles.iter().filter(|t| rasterise_model(t, frame, &mut sorter)).count();
-            skipped.fetch_add((triangles.len() - done) as u64, Ordering::Relaxed);
+            for triangle in triangles {
+                if sorter.is_enough() {
+                    return;
+                }
+                if !rasterise_model(triangle, frame, &mut sorter) {
+                    skipped.fetch_add(1, Ordering::Relaxed);
+                    outside.fetch_add(u64::from(triangle.iter().all(|p| p.is_finite())), Ordering::Relaxed);
+                }
+            }
         });
+        ledger.result()?;
         progress.advance(batch.len() as u64);
         Ok(())
     })?;
+    let held = ledger.bytes();
     let sorters = sorters.into_iter().map(|s| s.into_inner().expect("rasterising does not panic"));
-    let counts = ScanCounts { source: counts, skipped_triangles: skipped.into_inner(), ..ScanCounts::default() };
-    Ok((group_buckets(sorters), counts))
+    let counts = ScanCounts {
+        source: counts,
+        skipped_triangles: skipped.into_inner(),
+        outside_triangles: outside.into_inner(),
+        ..ScanCounts::default()
+    };
+    Ok((Collected { blocks: group_buckets(sorters), held }, counts))
+}
+
+/// How many hits are to be expected: the areas of the triangles' shadows along the three axes, in cells. Large numbers are right to a
+/// part in their root; of small and slanted triangles many have none, some have several. Cost: a pass over the source, 3 ns a triangle.
+///
+/// # Errors
+/// Whatever the source returns, and `Cancelled`.
+pub fn expected_hits(source: &mut dyn TriangleSource, frame: &Frame, progress: &dyn Progress) -> Result<f64> {
+    let to_cells = 1.0 / frame.cell_size();
+    let mut total = 0.0;
+    source.triangles(&mut |batch| {
+        check(progress)?;
+        for [a, b, c] in batch {
+            let twice_area = ((b - a) * to_cells).cross((c - a) * to_cells).abs().element_sum();
+            if twice_area.is_finite() {
+                total += 0.5 * twice_area;
+            }
+        }
+        Ok(())
+    })?;
+    Ok(total)
 }
 
 /// Rasterises a triangle in model coordinates; `false` if it cannot be placed in the grid.
 #[inline(never)]
-fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter) -> bool {
+fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter<'_>) -> bool {
     let [Some(a), Some(b), Some(c)] = triangle.map(|p| frame.snap(p)) else {
         return false;
     };
@@ -183,7 +239,7 @@ fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter)
 }
 
 /// The buckets of all threads, brought together by block, in Z-order of the blocks.
-fn group_buckets(sorters: impl Iterator<Item = HitSorter>) -> Blocks {
+fn group_buckets<'a>(sorters: impl Iterator<Item = HitSorter<'a>>) -> Blocks {
     let mut all: Vec<(BlockCoords, Bucket)> = sorters.flat_map(HitSorter::into_buckets).collect();
     all.sort_by_cached_key(|(block, _)| crate::grid::key::interleave(*block));
     let mut grouped = Blocks::new();
@@ -207,6 +263,8 @@ struct Resolved {
     /// Only of hit edges.
     oriented: HitBatch,
     hits: u64,
+    /// Bytes that the block's buckets held.
+    freed: u64,
 }
 
 impl Resolved {
@@ -222,13 +280,13 @@ impl Resolved {
     }
 }
 
-/// Resolves all blocks and passes them on in order.
+/// Resolves all blocks and passes them on in order; `push` returns the bytes that it holds then.
 fn resolve<const ORIENTED: bool>(
-    blocks: Blocks,
+    Collected { blocks, mut held }: Collected,
     depth: u32,
     with_normals: bool,
     progress: &dyn Progress,
-    mut push: impl FnMut(Resolved) + Send,
+    mut push: impl FnMut(Resolved) -> Result<u64> + Send,
 ) -> Result<()> {
     // Each block's hits are given back when it is resolved.
     let blocks: Vec<Mutex<_>> = blocks.into_iter().map(|block| Mutex::new(Some(block))).collect();
@@ -236,13 +294,15 @@ fn resolve<const ORIENTED: bool>(
         let block = blocks[n].lock().expect("locked once").take();
         let (block, buckets) = block.expect("each block is resolved once");
         hits.clear();
+        let freed = buckets.iter().map(Bucket::bytes).sum();
         buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
         let repeated = sort_hits(hits, spare);
-        resolve_block::<ORIENTED>(block, hits, repeated, depth, with_normals)
+        Resolved { freed, ..resolve_block::<ORIENTED>(block, hits, repeated, depth, with_normals) }
     };
-    let append = |block| {
-        push(block);
-        Ok(())
+    let append = |block: Resolved| {
+        held -= block.freed;
+        let bytes = push(block)?;
+        progress.hold(held + bytes)
     };
     in_order(blocks.len(), progress, Default::default, resolve, append)
 }

@@ -23,7 +23,7 @@ use crate::grid::{Axis, Key};
 use crate::mesh::TriangleSource;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::OrientedHits;
-use crate::octree::points::PointSet;
+use crate::octree::point_set::PointSet;
 use crate::octree::signed::{SignedOctree, Uniform};
 use crate::progress::Progress;
 use glam::{DVec3, Vec3};
@@ -234,7 +234,7 @@ struct Lost<'a> {
     /// These and their neighbours.
     about_mixed: PointSet,
     /// Where an edge is near that is lost, away from any surface: cells, or starts of edges.
-    near_lost: PointSet,
+    reaches: PointSet,
     shift: u32,
 }
 
@@ -246,7 +246,7 @@ impl<'a> Lost<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (crossings, depth) = (octree.crossings(), frame.depth());
-        let mixed = crossings.bricks().iter().map(|brick| (brick.key, crossings.mixed_cells(brick)));
+        let mixed = crossings.bricks().iter().enumerate().map(|(i, brick)| (brick.key, octree.mixed_cells(i)));
         let mixed = PointSet::new(depth, mixed);
         let about_mixed = mixed.dilated();
         let hits = scan_oriented(source, frame, false, progress)?.hits;
@@ -254,8 +254,8 @@ impl<'a> Lost<'a> {
         // three cells back: to the surface on which a sheet stands.
         let lost = lost_edges(&hits, octree);
         let lost = lost.into_iter().map(|(key, [x, y, z])| (key, (x | y | z) & !about_mixed.plane(key)));
-        let near_lost = PointSet::new(depth, lost).dilated().dilated().dilated();
-        Ok(Lost { octree, uniform: octree.uniform(), mixed, about_mixed, near_lost, shift: frame.cell_shift() })
+        let reaches = PointSet::new(depth, lost).dilated().dilated().dilated();
+        Ok(Lost { octree, uniform: octree.uniform(), mixed, about_mixed, reaches, shift: frame.cell_shift() })
     }
 
     fn is_inside(&self, at: [u32; 3]) -> bool {
@@ -280,7 +280,7 @@ impl Hits for Witness<'_> {
 
     fn hit(&mut self, _: Axis, at: [u32; 3], _: u16) {
         self.hits += 1;
-        self.is_lost = self.is_lost || self.lost.near_lost.contains(at);
+        self.is_lost = self.is_lost || self.lost.reaches.contains(at);
     }
 }
 
@@ -294,7 +294,7 @@ impl Wanted for Lost<'_> {
 
     fn point(&self, at: DVec3) -> bool {
         let cell = at.to_array().map(|c| c as u32);
-        if self.near_lost.contains(cell) {
+        if self.reaches.contains(cell) {
             return !self.mixed.contains(cell);
         }
         !self.about_mixed.contains(cell) && !self.is_inside(cell)

@@ -2,11 +2,15 @@
 
 mod args;
 mod bars;
+mod compare;
 mod digits;
 mod goal;
 mod info;
+mod interrupt;
 mod json;
 mod measure;
+mod memory;
+mod octree;
 mod print;
 mod render;
 mod repair;
@@ -15,14 +19,18 @@ mod summary;
 mod units;
 
 use args::{Args, Command};
-use clap::Parser;
 use std::process::ExitCode;
 use zmend::{Error, Result};
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = args::parse();
+    interrupt::listen();
     match run(&args) {
         Ok(code) => code,
+        Err(error @ Error::Cancelled) => {
+            print::error(&error);
+            ExitCode::from(interrupt::EXIT_CODE)
+        }
         Err(error) => {
             print::error(&error);
             ExitCode::FAILURE
@@ -37,6 +45,7 @@ fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Repair(args) => repair::run(args),
         Command::Info(args) => info::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Render(args) => render::run(args),
     }

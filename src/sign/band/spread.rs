@@ -16,6 +16,8 @@ use rayon::prelude::*;
 const SIDE: usize = 10;
 /// From a point to the next one along x and y.
 const STEP: [usize; 2] = [SIDE * SIDE, SIDE];
+/// For a step down, none or up: the first point of a brick with its surroundings, the first point of the brick there, and how many.
+const FROM: [(usize, usize, usize); 3] = [(0, 7, 1), (1, 0, 8), (9, 0, 1)];
 /// A component of a way that is longer than any other, also after a few steps.
 const FAR: f32 = 1e6;
 
@@ -106,8 +108,6 @@ impl Halo {
     /// Takes the ways of a brick and its neighbours.
     fn fill<'a>(&mut self, key: Key, look: impl Fn(Key) -> Option<&'a Field>) {
         self.0 = [[FAR; SIDE * SIDE * SIDE]; 3];
-        // For a step down, none or up: the first point here and there, and how many.
-        const FROM: [(usize, usize, usize); 3] = [(0, 7, 1), (1, 0, 8), (9, 0, 1)];
         let beside = Direction::ALL.into_iter().map(|d| (d.steps(), key.toward(d)));
         for (steps, key) in beside.chain([([0; 3], Some(key))]) {
             let Some(field) = key.and_then(&look) else { continue };

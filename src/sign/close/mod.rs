@@ -34,7 +34,8 @@ use crate::octree::crossings::{Crossings, Toggle};
 use crate::progress::{Progress, Stage, check};
 use patch::Patch;
 use rayon::prelude::*;
-use rings::{Exit, trace};
+use rings::{Exit, Step, trace};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What [`close`] did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -54,37 +55,60 @@ pub struct Closing {
 /// # Errors
 /// `Cancelled`.
 pub fn close(crossings: Crossings, progress: &dyn Progress) -> Result<(Crossings, Closing)> {
-    let odd = crossings.odd_faces();
-    if odd.is_empty() {
+    let odd_faces = crossings.count_odd_faces();
+    if odd_faces == 0 {
         return Ok((crossings, Closing::default()));
     }
+    let held = crossings.bytes() as u64 + odd_faces * RIM_BYTES;
+    progress.hold(held)?;
+    let odd = crossings.odd_faces();
     // Each odd face under both its cells.
     let number = |(face, number): (&Key, u32)| (*face, Exit { number, face: *face });
     let exits =
         odd.iter().zip(0..).map(number).flat_map(|(face, exit)| face.coboundary().map(move |cell| (cell, exit)));
-    let (switches, rings) = fill(&crossings, exits.collect(), progress)?;
+    let exits = exits.collect();
+    drop(odd);
+    let (switches, rings) = fill(&crossings, exits, held, progress)?;
     let mut toggles: Vec<Toggle> =
         switches.into_iter().map(|Switch { edge, sample, .. }| Toggle { edge, sample }).collect();
-    let mut closing = Closing { odd_faces: odd.len() as u64, rings, ..Closing::default() };
+    let mut closing = Closing { odd_faces, rings, ..Closing::default() };
     closing.switched = toggles.len() as u64;
     toggles.par_sort_unstable();
     let once = toggles.par_chunk_by(|a, b| a.edge == b.edge).filter(|same| same.len() % 2 == 1);
     closing.vanished = once.filter(|same| crossings.is_crossed(same[0].edge)).count() as u64;
-    let crossings = crossings.toggled(toggles);
-    debug_assert!(crossings.odd_faces().is_empty(), "filling all rings leaves no odd face");
+    let crossings = crossings.toggled_within(toggles, progress)?;
+    debug_assert_eq!(crossings.count_odd_faces(), 0, "filling all rings leaves no odd face");
     Ok((crossings, closing))
 }
 
-/// Traces the rings of a boundary and fills them: the edges switched, and the number of rings.
-fn fill(crossings: &Crossings, exits: Vec<(Key, Exit)>, progress: &dyn Progress) -> Result<(Vec<Switch>, u64)> {
-    let rings = trace(crossings, exits);
+/// The most bytes for each face of a boundary: listed, under both its cells, as a step of the walk and of its ring, and as a step of the
+/// rings into which that is cut.
+const RIM_BYTES: u64 = 8 + 3 * size_of::<(Key, Exit)>() as u64 + 1 + 16 + 2 * size_of::<Step>() as u64;
+
+/// The most bytes for each switched edge: in a list that may be half empty, and in one list of all.
+const SWITCH_BYTES: u64 = 3 * size_of::<Switch>() as u64;
+
+/// Traces the rings of a boundary and fills them: the edges switched, and the number of rings. `held` bytes are held already.
+fn fill(
+    crossings: &Crossings,
+    exits: Vec<(Key, Exit)>,
+    held: u64,
+    progress: &dyn Progress,
+) -> Result<(Vec<Switch>, u64)> {
+    let rings = trace(crossings, exits, progress)?;
     progress.begin(Stage::Close, rings.len() as u64);
     let count = rings.len() as u64;
+    let switched = AtomicU64::new(0);
+    // Asked while a patch grows.
+    let note = |switches: usize| {
+        check(progress)?;
+        let all = switched.fetch_add(switches as u64, Ordering::Relaxed) + switches as u64;
+        progress.hold(held + all * SWITCH_BYTES)
+    };
     let switches: Result<Vec<Vec<Switch>>> = rings
         .into_par_iter()
         .map(|ring| {
-            check(progress)?;
-            let switches = Patch::of(ring, crossings);
+            let switches = Patch::of(ring, crossings, &note)?;
             progress.advance(1);
             Ok(switches)
         })
@@ -113,7 +137,9 @@ pub(super) fn span(
             exits.push((from, Exit { number: exits.len() as u32, face }));
         }
     }
-    fill(crossings, exits, progress)
+    let held = crossings.bytes() as u64 + exits.len() as u64 * RIM_BYTES;
+    progress.hold(held)?;
+    fill(crossings, exits, held, progress)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::rings::{Ring, Step, area_vector, shortened};
 use super::runs::Runs;
+use crate::error::Result;
 use crate::geom::normal::NormalCode;
 use crate::grid::{Axis, Extent, Key};
 use crate::octree::crossings::{Crossings, OFFSET_MARGIN, Sample, finest_element};
@@ -31,14 +32,14 @@ pub(crate) struct Switch {
 }
 
 impl<'a> Patch<'a> {
-    /// The edges that the patch of a ring crosses.
-    pub(super) fn of(ring: Ring, crossings: &'a Crossings) -> Vec<Switch> {
+    /// The edges that the patch of a ring crosses; `note` is told of their number as they come, and may refuse.
+    pub(super) fn of(ring: Ring, crossings: &'a Crossings, note: &dyn Fn(usize) -> Result<()>) -> Result<Vec<Switch>> {
         let mut patch = Patch { crossings, normal: DVec3::ZERO, switches: Vec::new() };
-        patch.fill(ring);
-        patch.switches
+        patch.fill(ring, note)?;
+        Ok(patch.switches)
     }
 
-    fn fill(&mut self, ring: Ring) {
+    fn fill(&mut self, ring: Ring, note: &dyn Fn(usize) -> Result<()>) -> Result<()> {
         let mut pending = vec![(ring, DVec3::ZERO)];
         while let Some((ring, whole)) = pending.pop() {
             let ring = shortened(ring);
@@ -47,9 +48,12 @@ impl<'a> Patch<'a> {
                 // area to speak of says nothing: such a part faces where the whole did.
                 let own = area_vector(&ring);
                 self.normal = if own.length_squared() > 1.0 { own } else { whole };
+                let before = self.switches.len();
                 pending.extend(self.cut(ring, plane).into_iter().map(|part| (part, self.normal)));
+                note(self.switches.len() - before)?;
             }
         }
+        Ok(())
     }
 
     /// Cuts a ring by a plane that it crosses: rings that lie on one side each.

@@ -1,7 +1,9 @@
 //! The boundary of a surface as closed walks over cells.
 
+use crate::error::Result;
 use crate::grid::Key;
 use crate::octree::crossings::{Crossings, lattice_point};
+use crate::progress::{Progress, check};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -17,7 +19,10 @@ pub(super) type Ring = Vec<Step>;
 
 /// Takes the boundary apart into simple rings: no cell occurs twice in one. It is given as steps over grid faces, numbered in order, each
 /// under every cell from which it may be taken; it goes on in the cell on the other side.
-pub(super) fn trace(crossings: &Crossings, mut exits: Vec<(Key, Exit)>) -> Vec<Ring> {
+///
+/// # Errors
+/// `Cancelled`.
+pub(super) fn trace(crossings: &Crossings, mut exits: Vec<(Key, Exit)>, progress: &dyn Progress) -> Result<Vec<Ring>> {
     // Walks begin in the order in which steps are given.
     let starts: Vec<Key> = exits.chunk_by(|a, b| a.1.number == b.1.number).map(|same| same[0].0).collect();
     exits.par_sort_unstable();
@@ -28,11 +33,16 @@ pub(super) fn trace(crossings: &Crossings, mut exits: Vec<(Key, Exit)>) -> Vec<R
     let mut walk: Vec<(Key, Key)> = Vec::new();
     let mut on_walk: hashbrown::HashMap<Key, usize, ahash::RandomState> =
         hashbrown::HashMap::with_hasher(ahash::RandomState::with_seeds(9, 10, 11, 12));
+    let mut steps = 0u64;
     for (start, mut cell) in starts.into_iter().enumerate() {
         if used[start] {
             continue;
         }
         loop {
+            steps += 1;
+            if steps.is_multiple_of(4096) {
+                check(progress)?;
+            }
             if let Some(&since) = on_walk.get(&cell) {
                 let ring = walk.split_off(since);
                 for (cell, _) in &ring {
@@ -52,7 +62,7 @@ pub(super) fn trace(crossings: &Crossings, mut exits: Vec<(Key, Exit)>) -> Vec<R
             cell = face.coboundary().find(|&next| next != cell).expect("faces of a boundary have two cells");
         }
     }
-    rings
+    Ok(rings)
 }
 
 /// A step of the boundary over a grid face. Steps that may be taken only once have one number.
