@@ -21,6 +21,7 @@
 //! ```
 
 pub mod crossings;
+pub mod edited;
 mod locate;
 mod neighbour;
 #[cfg(test)]
@@ -40,6 +41,7 @@ use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
 pub use crossings::Crossings;
+pub use edited::EditedOctree;
 pub use neighbour::Neighbours;
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
