@@ -113,11 +113,11 @@ struct Knot {
 }
 
 /// Which cells have vertices, and which numbers.
-struct Layout<'a> {
+pub(super) struct Layout<'a> {
     octree: &'a SignedOctree,
     bricks: Vec<CellBrick>,
     knots: Vec<Knot>,
-    vertices: u64,
+    pub(super) vertices: u64,
 }
 
 struct CellBrick {
@@ -129,7 +129,7 @@ struct CellBrick {
 }
 
 impl<'a> Layout<'a> {
-    fn new(octree: &'a SignedOctree) -> Self {
+    pub(super) fn new(octree: &'a SignedOctree) -> Self {
         let found: Vec<(Plane, Vec<Knot>)> = (0..octree.crossings().bricks().len())
             .into_par_iter()
             .map(|i| {
@@ -181,7 +181,7 @@ impl<'a> Layout<'a> {
     }
 
     /// The vertex of the cell at `at` to which its inside corner `corner` belongs.
-    fn vertex(&self, at: [u32; 3], corner: Corner) -> u32 {
+    pub(super) fn vertex(&self, at: [u32; 3], corner: Corner) -> u32 {
         let crossings = self.octree.crossings();
         let key = Key::cell(crossings.depth() - 3, at.map(|c| c >> 3)).expect("cells lie in the root cube");
         let brick = crossings.find(key).expect("mixed cells belong to listed bricks");
@@ -193,7 +193,7 @@ impl<'a> Layout<'a> {
     }
 
     /// The polygons beside inside edges and on inside faces of irregular cells, each with its brick.
-    fn extra_polygons(&self) -> Vec<(usize, Vec<u32>)> {
+    pub(super) fn extra_polygons(&self) -> Vec<(usize, Vec<u32>)> {
         let mut polygons = Vec::new();
         for (i, brick) in self.octree.crossings().bricks().iter().enumerate() {
             let origin = self.octree.crossings().origin(brick);

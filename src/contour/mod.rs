@@ -7,12 +7,14 @@
 mod cells;
 mod cubes;
 mod dual;
+mod edited;
 
 pub use cubes::marching_cubes;
 /// Bricks of a piece: some five thousand cells, whose points and faces stay in the cache until they are taken.
 const PIECE: usize = 64;
 
 pub use dual::{DualOptions, Placement, dual_contouring};
+pub use edited::dual_contouring_edited;
 
 #[cfg(test)]
 mod tests {

@@ -25,6 +25,8 @@ mod number;
 mod obj;
 mod off;
 mod ply;
+pub mod skeleton;
+pub mod skt;
 mod stl;
 mod text;
 mod write;
