@@ -5,7 +5,7 @@ mod common;
 use common::distance::hausdorff;
 use common::shapes::{boxed, soup, triangle, unit_cube};
 use common::{
-    Chance, SURFACES, Topology, check, check_repaired, data, mend, options, own_check, together, volume, with_faces,
+    Chance, Topology, check, check_repaired, data, mend, options, own_check, surfaces, together, volume, with_faces,
     with_points,
 };
 use glam::{DMat3, DQuat, DVec3, EulerRot};
@@ -17,7 +17,7 @@ use zmend::{Faces, Mesh, Options, Repaired, Surface, repair, repair_into};
 
 const DC: Surface = Surface::DualContouring;
 const MC: Surface = Surface::MarchingCubes;
-const KINDS: [Surface; 3] = [MC, DC, Surface::Quads];
+const KINDS: [Surface; 4] = [MC, DC, Surface::Quads, Surface::Blocks];
 
 fn build(name: &str) -> Mesh {
     sample::build(name, 1).expect("a sample")
@@ -25,12 +25,12 @@ fn build(name: &str) -> Mesh {
 
 /// Repairs in all modes, checks, and returns the marching cubes' result with the topology that all agree on.
 fn mended(what: &str, mesh: &Mesh, depth: u32) -> (Topology, Repaired) {
-    let mut results = SURFACES.iter().map(|&(mode, surface, faces)| {
-        let repaired = repair(mesh.clone(), &options(depth, surface, faces)).expect("repairable");
+    let mut results = surfaces(depth).into_iter().map(|(mode, options)| {
+        let repaired = repair(mesh.clone(), &options).expect("repairable");
         let topology = check_repaired(&repaired).unwrap_or_else(|e| panic!("{what}, {mode}: {e}"));
         (topology, repaired)
     });
-    let first = results.next().expect("four modes");
+    let first = results.next().expect("seven modes");
     results.for_each(|(topology, _)| assert_eq!(topology, first.0, "{what}"));
     first
 }
@@ -376,11 +376,12 @@ fn thin_slabs_stay_closed_whatever_their_angle() {
         for seed in 0..6 {
             let rotation = Chance(seed).rotation();
             let slab = with_points(&slab, |p| rotation * p);
-            for (mode, surface, faces) in SURFACES {
-                let repaired = repair(slab.clone(), &options(6, surface, faces)).expect("repairable");
+            for (mode, options) in surfaces(6) {
+                let repaired = repair(slab.clone(), &options).expect("repairable");
                 assert_eq!(repaired.mesh.validate(), Ok(()), "{mode}");
                 // Both walls of a slab in one cell share its vertex in dual surfaces: these may turn over where it is flat.
-                let least = if surface == MC { 0.0 } else { -1e-3 };
+                let is_embedded = matches!(options.surface, MC | Surface::Blocks) || options.no_self_intersections;
+                let least = if is_embedded { 0.0 } else { -1e-3 };
                 assert!(volume(&repaired.mesh) >= least, "{mode}: {}", volume(&repaired.mesh));
             }
         }

@@ -96,10 +96,6 @@ impl<'a> Cells<'a> {
         let bit = 8 * y + z;
         self.corners.iter().enumerate().fold(0, |mask, (i, plane)| mask | ((plane.0[x as usize] >> bit & 1) as u8) << i)
     }
-
-    pub(super) fn brick(&self) -> &'a Brick {
-        self.brick
-    }
 }
 
 /// The transposed matrix of 8 x 8 bits, a row in each byte (Warren, Hacker's Delight, 7-3).

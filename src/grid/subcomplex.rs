@@ -75,13 +75,13 @@ impl Part {
     /// The axes along which it extends.
     pub const fn extent(self) -> Extent {
         let digits = self.digits();
-        Extent::ALL[((digits[0] % 2) << 2 | (digits[1] % 2) << 1 | digits[2] % 2) as usize]
+        Extent::ALL[((digits[0] % 2) << 2 | (digits[1] % 2) << 1 | (digits[2] % 2)) as usize]
     }
 
     /// Its corner with the smallest coordinates.
     pub const fn start(self) -> Corner {
         let digits = self.digits();
-        Corner::ALL[((digits[0] / 2) << 2 | (digits[1] / 2) << 1 | digits[2] / 2) as usize]
+        Corner::ALL[((digits[0] / 2) << 2 | (digits[1] / 2) << 1 | (digits[2] / 2)) as usize]
     }
 
     const fn digits(self) -> [u8; 3] {

@@ -6,7 +6,7 @@ mod report;
 pub use options::{Faces, Options, Surface};
 pub use report::{RepairReport, Warning};
 
-use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
+use crate::contour::{DualOptions, Intersections, Placement, dual_contouring, marching_cubes};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
@@ -109,13 +109,15 @@ fn extract(
         Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
         Surface::DualContouring => Placement::SharpFeatures,
         Surface::Quads => Placement::MassPoint,
+        Surface::Blocks => Placement::Centre,
     };
+    let intersections = if options.no_self_intersections { Intersections::Avoid } else { Intersections::Allow };
     let triangles = match options.faces {
-        Faces::Auto => options.surface != Surface::Quads,
+        Faces::Auto => options.surface == Surface::DualContouring,
         Faces::Triangles => true,
         Faces::Polygons => false,
     };
-    dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
+    dual_contouring(octree, frame, &DualOptions { placement, triangles, intersections }, sink, progress)
 }
 
 /// An input without faces gets the unit cube: all checks of options apply, and the result is empty.

@@ -12,11 +12,20 @@ pub struct Options {
     pub surface: Surface,
     /// What the faces are. Default [`Faces::Auto`].
     pub faces: Faces,
+    /// Whether faces must not pass through each other: see [`Intersections`](crate::contour::Intersections). Marching cubes and blocks
+    /// have no such faces in any case, whatever this says. Default false.
+    pub no_self_intersections: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { depth: 8, scale: 0.9, surface: Surface::default(), faces: Faces::default() }
+        Options {
+            depth: 8,
+            scale: 0.9,
+            surface: Surface::default(),
+            faces: Faces::default(),
+            no_self_intersections: false,
+        }
     }
 }
 
@@ -30,12 +39,14 @@ pub enum Surface {
     DualContouring,
     /// Dual contouring with points at the mean of the crossings: smooth quadrilaterals, no sharp edges.
     Quads,
+    /// Squares of one cell, as if the solid were built of blocks.
+    Blocks,
 }
 
 /// What the faces of a surface are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Faces {
-    /// Polygons for [`Surface::Quads`], triangles for the others.
+    /// Polygons for [`Surface::Quads`] and [`Surface::Blocks`], triangles for the others.
     #[default]
     Auto,
     /// Triangles; quadrilaterals of dual surfaces are cut along creases.

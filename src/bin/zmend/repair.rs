@@ -28,6 +28,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         surface: args.surface.kind.into(),
         // STL has nothing else, and the surface knows better than the writer which diagonals to take.
         faces: if format == Format::Stl { Faces::Triangles } else { args.surface.faces.into() },
+        no_self_intersections: args.surface.no_self_intersections,
     };
 
     let bars = Bars::new(!args.tell.quiet && !args.tell.json);

@@ -141,5 +141,6 @@ fn surface_name(surface: Surface) -> &'static str {
         Surface::MarchingCubes => "mc",
         Surface::DualContouring => "dc",
         Surface::Quads => "quads",
+        Surface::Blocks => "blocks",
     }
 }

@@ -43,7 +43,8 @@ mod seam;
 mod tests;
 mod touched;
 
-use super::dual::{DualOptions, Layout, dual_contouring};
+use super::dual::{DualOptions, check_normals, contour, dual_contouring};
+use super::layout::{KnotVertices, Layout};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{MeshSink, MeshSizes};
@@ -57,9 +58,9 @@ use touched::Touched;
 /// solid thickened a little, whatever the edits. Without any it is exactly that of [`dual_contouring`]; with edits, vertices and polygons of
 /// cells that no edit touches are the same and come in the same order, and then those of the others.
 ///
-/// Vertices of touched cells are placed smoothly whatever `options.placement` says: edits have no normals. There is no counterpart
-/// for marching cubes, whose points are crossings of edges: take [`Placement::MassPoint`](super::Placement::MassPoint), which lies
-/// next to it.
+/// Vertices of touched cells are placed smoothly unless blocks are asked for: edits have no normals. There is no counterpart for marching
+/// cubes, whose points are crossings of edges: take [`Placement::MassPoint`](super::Placement::MassPoint), which lies next to it. With
+/// edits, [`Intersections::Avoid`](super::Intersections::Avoid) is not heeded.
 ///
 /// # Errors
 /// Whatever `sink` returns, and `Cancelled`.
@@ -77,28 +78,29 @@ pub fn dual_contouring_edited(
     if !octree.is_edited() {
         return dual_contouring(signed, frame, options, sink, progress);
     }
+    check_normals(signed.crossings(), options);
     check(progress)?;
-    let layout = Layout::new(signed);
+    let layout = Layout::new(signed, KnotVertices::OfCase);
     let touched = Touched::new(octree);
     check(progress)?;
     let patch = Patch::new(&touched, &layout);
     let polygons = patch.polygons();
     check(progress)?;
     // Of the unedited surface, what the filter leaves.
-    let kept_extras = layout.extra_polygons().into_iter().map(|(_, polygon)| polygon);
-    let (quads, triangles) = kept_extras.filter(|polygon| !polygon.iter().any(|&v| patch.ranks.contains(v))).fold(
-        (0, 0),
-        |(quads, triangles), p| if p.len() == 4 { (quads + 1, triangles) } else { (quads, triangles + 1) },
-    );
-    let quads = quads + (signed.crossings().len() + polygons.quads.len()) as u64 - patch.dropped_quads();
-    let triangles: u64 = triangles + polygons.triangles.len() as u64;
+    let extras = layout.extra_polygons();
+    let kept = extras.iter().filter(|(_, polygon)| !polygon.iter().any(|&v| patch.ranks.contains(v)));
+    let (extra_triangles, extra_quads): (Vec<usize>, Vec<usize>) =
+        kept.map(|(_, polygon)| polygon.len()).partition(|&corners| corners == 3);
+    let quads = signed.crossings().len() + extra_quads.len() + polygons.quads.len();
+    let quads = quads as u64 - patch.dropped_quads();
+    let triangles = (extra_triangles.len() + polygons.triangles.len()) as u64;
     let sizes = MeshSizes {
         points: u64::from(patch.kept) + u64::from(touched.vertices),
         faces: if options.triangles { 2 * quads } else { quads } + triangles,
         corners: if options.triangles { 6 } else { 4 } * quads + 3 * triangles,
     };
-    let mut seam = Seam::new(sink, signed.crossings(), frame, (&patch, &polygons), sizes, options.triangles);
-    dual_contouring(signed, frame, &DualOptions { triangles: false, ..*options }, &mut seam, progress)?;
+    let mut seam = Seam::new(sink, signed.crossings(), frame, (&patch, &polygons), sizes, *options);
+    contour(&layout, &extras, frame, &DualOptions { triangles: false, ..*options }, &mut seam, progress)?;
     seam.finish()?;
     Ok(sizes)
 }

@@ -7,6 +7,7 @@
 
 use super::polygons::{Patch, Polygons};
 use super::touched::TouchedCell;
+use crate::contour::Placement;
 use crate::grid::{Axis, Corner, Edge};
 use crate::octree::crossings::{Crossings, finest_element};
 use glam::DVec3;
@@ -34,11 +35,15 @@ struct Moving {
 /// `fixed` their positions. Cost: some 0.3 us a vertex, in parallel.
 pub(super) fn place(
     crossings: &Crossings,
+    placement: Placement,
     patch: &Patch<'_>,
     polygons: &Polygons,
     ring: &[u32],
     fixed: &[DVec3],
 ) -> Vec<DVec3> {
+    if placement == Placement::Centre {
+        return patch.touched.cells.iter().flat_map(middles_of).collect();
+    }
     let mut moving: Vec<Moving> =
         patch.touched.cells.par_iter().flat_map_iter(|cell| vertices_of(crossings, cell)).collect();
     let neighbours = Neighbours::new(polygons, ring, patch.kept, moving.len());
@@ -90,6 +95,26 @@ impl Neighbours {
     }
 }
 
+/// The middles of the octants of each vertex of a cell, or of the cell if there is only one.
+fn middles_of(cell: &TouchedCell) -> impl Iterator<Item = DVec3> {
+    let cell = *cell;
+    (0..cell.vertices).map(move |vertex| {
+        let corners = Corner::ALL.into_iter().filter(|c| cell.vertices > 1 && cell.slots[c.index()] == vertex);
+        let (sum, n) = corners.fold((DVec3::ZERO, 0.0), |(sum, n), c| (sum + octant_middle(c), n + 1.0));
+        DVec3::from(cell.at.map(f64::from)) + if n > 0.0 { sum / n } else { DVec3::splat(0.5) }
+    })
+}
+
+/// The middle of the octant of a cell at a corner, from where the cell starts.
+fn octant_middle(corner: Corner) -> DVec3 {
+    0.25 + 0.5 * position(corner)
+}
+
+/// Where a corner is in its cell.
+fn position(corner: Corner) -> DVec3 {
+    DVec3::from(Axis::ALL.map(|a| f64::from(u8::from(corner & a))))
+}
+
 /// The vertices of a cell before they are smoothed.
 fn vertices_of(crossings: &Crossings, cell: &TouchedCell) -> impl Iterator<Item = Moving> {
     let cell = *cell;
@@ -98,18 +123,16 @@ fn vertices_of(crossings: &Crossings, cell: &TouchedCell) -> impl Iterator<Item 
         let corners = || Corner::ALL.into_iter().filter(move |c| cell.slots[c.index()] == vertex);
         let (mut low, mut high) = (DVec3::ONE, DVec3::ZERO);
         let (mut sum, mut n) = (DVec3::ZERO, 0.0);
-        let mut middle = DVec3::ZERO;
         for corner in corners() {
-            let here = DVec3::from(Axis::ALL.map(|a| f64::from(u8::from(corner & a))));
+            let here = position(corner);
             (low, high) = (low.min(0.5 * here), high.max(0.5 * here + 0.5));
-            middle += 0.5 * here + 0.25;
             for axis in Axis::ALL.into_iter().filter(|&a| !cell.parts.contains(Edge::at(a, corner))) {
                 let sign = if corner & axis { -1.0 } else { 1.0 };
                 sum += here + DVec3::AXES[axis.index()] * sign * distance(crossings, &cell, corner, axis);
                 n += 1.0;
             }
         }
-        middle /= corners().count() as f64;
+        let middle = corners().map(octant_middle).sum::<DVec3>() / corners().count() as f64;
         if cell.vertices == 1 {
             (low, high) = (DVec3::ZERO, DVec3::ONE);
         }

@@ -1,7 +1,7 @@
 //! The polygons round the vertices of touched cells, and which ones of the unedited surface they replace.
 
 use super::touched::{At, Touched};
-use crate::contour::dual::Layout;
+use crate::contour::layout::Layout;
 use crate::grid::cases::{CASES, is_crossed};
 use crate::grid::{Axis, Corner, Edge, Face};
 use rayon::prelude::*;

@@ -2,6 +2,7 @@
 
 use super::place::place;
 use super::polygons::{Patch, Polygons};
+use crate::contour::DualOptions;
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{MeshSink, MeshSizes};
@@ -17,7 +18,7 @@ pub(super) struct Seam<'a> {
     polygons: &'a Polygons,
     /// What the edited surface will have.
     sizes: MeshSizes,
-    triangles: bool,
+    options: DualOptions,
     /// Vertices of the unedited surface that have passed, those of them that were dropped, and those of the ring.
     passed: u32,
     dropped: usize,
@@ -35,7 +36,7 @@ impl<'a> Seam<'a> {
         frame: &'a Frame,
         (patch, polygons): (&'a Patch<'a>, &'a Polygons),
         sizes: MeshSizes,
-        triangles: bool,
+        options: DualOptions,
     ) -> Self {
         let mut ring: Vec<u32> = polygons.sides().map(|[from, _]| from).filter(|&v| v < patch.kept).collect();
         ring.sort_unstable();
@@ -48,7 +49,7 @@ impl<'a> Seam<'a> {
             patch,
             polygons,
             sizes,
-            triangles,
+            options,
             passed: 0,
             dropped: 0,
             ring,
@@ -73,7 +74,7 @@ impl<'a> Seam<'a> {
         if std::mem::replace(&mut self.is_placed, true) {
             return Ok(());
         }
-        let placed = place(self.crossings, self.patch, self.polygons, &self.ring, &self.fixed);
+        let placed = place(self.crossings, self.options.placement, self.patch, self.polygons, &self.ring, &self.fixed);
         let points: Vec<DVec3> = placed.into_iter().map(|p| self.frame.to_model(p)).collect();
         self.sink.points(&points)
     }
@@ -87,7 +88,7 @@ impl<'a> Seam<'a> {
 
     /// Passes on quadrilaterals, or the triangles they are cut into.
     fn quads(&mut self, corners: &[u32]) -> Result<()> {
-        if !self.triangles {
+        if !self.options.triangles {
             return self.sink.faces(4, corners);
         }
         let cut: Vec<u32> = corners.chunks_exact(4).flat_map(|q| [q[0], q[1], q[2], q[0], q[2], q[3]]).collect();

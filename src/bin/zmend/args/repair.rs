@@ -15,6 +15,7 @@ Examples:
   zmend repair broken.stl fixed.stl
   zmend repair broken.obj -o fixed.ply --depth 9      twice as fine, four times the faces and time
   zmend repair part.stl fixed.stl --surface dc        keep sharp edges and corners
+  zmend repair part.stl fixed.stl --surface dc --no-self-intersections
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
@@ -60,9 +61,12 @@ pub(crate) struct SurfaceArgs {
     /// Kind of surface.
     #[arg(short = 's', long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
     pub(crate) kind: SurfaceArg,
-    /// What the faces are: auto is polygons for quads, triangles for mc and dc.
+    /// What the faces are: auto is polygons for quads and blocks, triangles for mc and dc.
     #[arg(long, value_name = "KIND", value_enum, default_value_t = FacesArg::Auto)]
     pub(crate) faces: FacesArg,
+    /// No face passes through another one. Some faces of dc and quads are cut in four for that; mc and blocks need no change.
+    #[arg(long)]
+    pub(crate) no_self_intersections: bool,
 }
 
 /// How the result is written.
@@ -105,11 +109,11 @@ impl RepairArgs {
 /// Kinds of faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FacesArg {
-    /// Polygons for quads, triangles for mc and dc.
+    /// Polygons for quads and blocks, triangles for mc and dc.
     Auto,
     /// Triangles.
     Triangles,
-    /// Quadrilaterals and a few triangles for dc and quads. Some programs cannot read PLY files with both.
+    /// Quadrilaterals and a few triangles for dc, quads and blocks. Some programs cannot read PLY files with both.
     Polygons,
 }
 
@@ -132,6 +136,8 @@ pub(crate) enum SurfaceArg {
     Dc,
     /// Dual contouring without sharp edges: smooth quadrilaterals.
     Quads,
+    /// Squares of one cell, as if built of blocks.
+    Blocks,
 }
 
 impl From<SurfaceArg> for zmend::Surface {
@@ -140,6 +146,7 @@ impl From<SurfaceArg> for zmend::Surface {
             SurfaceArg::Mc => zmend::Surface::MarchingCubes,
             SurfaceArg::Dc => zmend::Surface::DualContouring,
             SurfaceArg::Quads => zmend::Surface::Quads,
+            SurfaceArg::Blocks => zmend::Surface::Blocks,
         }
     }
 }
