@@ -59,10 +59,16 @@ fn torus() -> SignedOctree {
         signs.push((key, plane));
     }
     signs.sort_unstable_by_key(|s| s.0);
-    SignedOctree::from_signs(DEPTH, false, &signs, |_| false, |_, crossed, out| {
-        let count = crossed.iter().map(Plane::count).sum::<u32>() as usize;
-        out.resize(count, Sample::new(1 << 15, 0));
-    })
+    SignedOctree::from_signs(
+        DEPTH,
+        false,
+        &signs,
+        |_| false,
+        |_, crossed, out| {
+            let count = crossed.iter().map(Plane::count).sum::<u32>() as usize;
+            out.resize(count, Sample::new(1 << 15, 0));
+        },
+    )
 }
 
 /// What of the faces half way up is not in the solid, out to the middle of the tube.

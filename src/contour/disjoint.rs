@@ -31,7 +31,7 @@
 use super::PIECE;
 use super::dual::{DualOptions, Faces};
 use super::envelope::{Safe, safe_diagonals};
-use super::layout::{CellTable, Knot, KnotVertices, Layout, Seen};
+use super::layout::{CellTable, Knot, Layout, Seen, Style};
 use super::place::Planes;
 use crate::error::Result;
 use crate::geom::Frame;
@@ -60,7 +60,7 @@ const POINT: Cut = 4;
 pub(super) fn disjoint_contouring(
     octree: &SignedOctree,
     frame: &Frame,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
@@ -68,7 +68,7 @@ pub(super) fn disjoint_contouring(
     progress.begin(Stage::Contour, 4 * bricks as u64);
     let (count, piece) = pieces(bricks, PIECE);
     let mut placed =
-        Placed { layout: Layout::new(octree, KnotVertices::None), positions: Segments::default(), sharp: Vec::new() };
+        Placed { layout: Layout::new(octree, Style::Disjoint)?, positions: Segments::default(), sharp: Vec::new() };
     let layout = &placed.layout;
     let (positions, sharp) = (&mut placed.positions, &mut placed.sharp);
     in_order(
@@ -138,7 +138,7 @@ fn rounded(cell: Local, p: Vec3A) -> InCell {
 fn place(
     layout: &Layout<'_>,
     planes: &mut Planes,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     range: Range<usize>,
 ) -> (Vec<InCell>, Vec<Plane>) {
     let mut positions = Vec::with_capacity((layout.first_of(range.end) - layout.first_of(range.start)) as usize);

@@ -12,7 +12,7 @@
 
 use super::PIECE;
 use super::disjoint::disjoint_contouring;
-use super::layout::{CellTable, KnotVertices, Layout, Seen, slot, starts};
+use super::layout::{BRICK_BYTES, CellTable, Layout, Seen, Style, slot, starts};
 use super::place::Planes;
 use crate::error::Result;
 use crate::geom::Frame;
@@ -21,15 +21,15 @@ use crate::grid::brick::Plane;
 use crate::grid::cases::Mask;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::crossings::Brick;
-use crate::octree::{Crossings, SignedOctree};
+use crate::octree::{Crossings, SignedOctree, StoredPoints};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
 use glam::DVec3;
 use std::ops::Range;
 
 /// Where the vertices go.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Placement {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Placement<'a> {
     /// At the minimum of the quadratic error function, kept inside the cell: sharp edges and corners are kept. Needs normals.
     #[default]
     SharpFeatures,
@@ -39,6 +39,21 @@ pub enum Placement {
     /// it. Where blocks touch only along an edge or in a corner, each keeps 1/64 of a cell to itself, so that the surface does not meet
     /// itself there.
     Centre,
+    /// At points that are known already, as those of SOG files; cells without one are placed by [`SharpFeatures`](Self::SharpFeatures).
+    /// Several vertices of a cell keep a little apart from its point. Needs normals, to tell where creases are.
+    Given {
+        /// The points of the mixed cells of the octree.
+        points: &'a StoredPoints,
+        /// Where the grid lies in their space.
+        frame: &'a Frame,
+    },
+}
+
+impl Placement<'_> {
+    /// Whether it looks at the normals of crossings.
+    pub fn needs_normals(&self) -> bool {
+        matches!(self, Placement::SharpFeatures | Placement::Given { .. })
+    }
 }
 
 /// Whether faces may pass through each other.
@@ -52,10 +67,10 @@ pub enum Intersections {
 }
 
 /// How [`dual_contouring`] makes the surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct DualOptions {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DualOptions<'a> {
     /// Where the vertices go.
-    pub placement: Placement,
+    pub placement: Placement<'a>,
     /// Split quadrilaterals into triangles, along creases where there are any.
     pub triangles: bool,
     /// Whether faces may pass through each other. [`Placement::Centre`] has no such faces in any case.
@@ -66,14 +81,14 @@ pub struct DualOptions {
 /// Quadrilaterals begin with a corner of the diagonal by which they are best split.
 ///
 /// # Errors
-/// Whatever `sink` returns, and `Cancelled`.
+/// Whatever `sink` returns, `Cancelled`, `Memory` when `progress` says so, and when there are more than 2^32 vertices.
 ///
 /// # Panics
 /// When sharp features are asked for and the octree has no normals.
 pub fn dual_contouring(
     octree: &SignedOctree,
     frame: &Frame,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
@@ -81,30 +96,32 @@ pub fn dual_contouring(
     if options.intersections == Intersections::Avoid && options.placement != Placement::Centre {
         return disjoint_contouring(octree, frame, options, sink, progress);
     }
-    let layout = Layout::new(octree, KnotVertices::OfCase);
+    progress.begin(Stage::Contour, 2 * octree.crossings().bricks().len() as u64);
+    progress.hold((octree.bytes() + octree.crossings().bricks().len() * BRICK_BYTES) as u64)?;
+    let layout = Layout::new(octree, Style::Usual)?;
     let polygons = layout.extra_polygons();
     contour(&layout, &polygons, frame, options, sink, progress)
 }
 
 /// # Panics
 /// When sharp features are asked for and there are no normals.
-pub(super) fn check_normals(crossings: &Crossings, options: &DualOptions) {
+pub(super) fn check_normals(crossings: &Crossings, options: &DualOptions<'_>) {
     let has_normals = crossings.with_normals() || crossings.is_empty();
-    assert!(options.placement != Placement::SharpFeatures || has_normals, "sharp features need normals");
+    assert!(!options.placement.needs_normals() || has_normals, "sharp features need normals");
 }
 
-/// The same for a layout at hand, with its [extra polygons](Layout::extra_polygons), whatever `options` says about intersections.
+/// [`dual_contouring`] with a layout and its [extra polygons](Layout::extra_polygons) at hand, once the stage has begun, and whatever
+/// `options` says about intersections.
 pub(super) fn contour(
     layout: &Layout<'_>,
     polygons: &[(usize, Vec<u32>)],
     frame: &Frame,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
     let crossings = layout.octree.crossings();
     let bricks = crossings.bricks().len();
-    progress.begin(Stage::Contour, 2 * bricks as u64);
     let (quads, extra_corners) = (crossings.len() as u64, polygons.iter().map(|p| p.1.len() as u64).sum::<u64>());
     let sizes = if options.triangles {
         let triangles = 2 * quads + extra_corners - 2 * polygons.len() as u64;
@@ -145,7 +162,7 @@ impl Layout<'_> {
     fn place_vertices(
         &self,
         frame: &Frame,
-        placement: Placement,
+        placement: Placement<'_>,
         planes: &mut Planes,
         range: Range<usize>,
     ) -> (Vec<DVec3>, Vec<Plane>) {

@@ -4,21 +4,22 @@
 //! in the plane of mixed cells, corrected for the [knots](Knot) before it: cells with several vertices or none, of which there are few and
 //! which are listed.
 
-use super::cells::Cells;
+use crate::error::{Error, Result};
 use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::{CASES, Mask};
 use crate::grid::{Axis, Corner, Key};
 use crate::octree::SignedOctree;
+use crate::octree::cells::Cells;
 use crate::octree::crossings::toward;
 use rayon::prelude::*;
 
-/// How many vertices a knotty cell has.
+/// What is done about vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum KnotVertices {
-    /// Those of its case.
-    OfCase,
-    /// None: something else stands for the surface in it.
-    None,
+pub(super) enum Style {
+    /// Knots have the vertices of their case. Vertices may leave their cell for one that has none.
+    Usual,
+    /// Knots have no vertex: something else stands for the surface in them. Vertices stay in their cells.
+    Disjoint,
 }
 
 /// A mixed cell whose vertices are not the ordinary single one.
@@ -31,7 +32,7 @@ pub(super) struct Knot {
 /// Which cells have vertices, and which numbers.
 pub(super) struct Layout<'a> {
     pub(super) octree: &'a SignedOctree,
-    pub(super) of_knots: KnotVertices,
+    pub(super) style: Style,
     bricks: Vec<CellBrick>,
     knots: Vec<Knot>,
     /// Number of vertices.
@@ -46,8 +47,11 @@ struct CellBrick {
     knots: u32,
 }
 
+/// The most bytes that a [`Layout`] takes for each brick while it is made, and after that.
+pub(super) const BRICK_BYTES: usize = size_of::<(Plane, Vec<Knot>)>() + size_of::<CellBrick>();
+
 impl<'a> Layout<'a> {
-    pub(super) fn new(octree: &'a SignedOctree, of_knots: KnotVertices) -> Self {
+    pub(super) fn new(octree: &'a SignedOctree, style: Style) -> Result<Self> {
         let found: Vec<(Plane, Vec<Knot>)> = (0..octree.crossings().bricks().len())
             .into_par_iter()
             .map(|i| {
@@ -58,15 +62,20 @@ impl<'a> Layout<'a> {
             })
             .collect();
         let mut layout =
-            Layout { octree, of_knots, bricks: Vec::with_capacity(found.len()), knots: Vec::new(), vertices: 0 };
+            Layout { octree, style, bricks: Vec::with_capacity(found.len()), knots: Vec::new(), vertices: 0 };
         for (mixed, knots) in found {
-            let first = u32::try_from(layout.vertices).expect("fewer than 2^32 vertices");
+            let first = layout.vertices as u32;
             let extra: i64 = knots.iter().map(|&k| i64::from(layout.extra_vertices(k))).sum();
             layout.vertices += (i64::from(mixed.count()) + extra) as u64;
+            if u32::try_from(layout.vertices).is_err() {
+                let problem =
+                    format!("the surface has {} vertices or more; {} can be numbered", layout.vertices, u32::MAX);
+                return Err(Error::setting("depth", problem, "take a smaller depth"));
+            }
             layout.bricks.push(CellBrick { mixed, first, knots: layout.knots.len() as u32 });
             layout.knots.extend(knots);
         }
-        layout
+        Ok(layout)
     }
 
     /// The knots of a brick.
@@ -85,11 +94,18 @@ impl<'a> Layout<'a> {
         self.bricks[brick].mixed
     }
 
+    /// Whether the cell at `at` is mixed. Cost: a hash probe.
+    pub(super) fn is_mixed(&self, at: [u32; 3]) -> bool {
+        let crossings = self.octree.crossings();
+        let brick = Key::cell(crossings.depth() - 3, at.map(|c| c >> 3)).and_then(|key| crossings.find(key));
+        brick.is_some_and(|brick| self.bricks[brick].mixed.get(Local::new(at[0], at[1], at[2])))
+    }
+
     /// Vertices beyond the first.
     fn extra_vertices(&self, knot: Knot) -> i32 {
-        match self.of_knots {
-            KnotVertices::OfCase => i32::from(CASES[usize::from(knot.mask)].sheets.vertices) - 1,
-            KnotVertices::None => -1,
+        match self.style {
+            Style::Usual => i32::from(CASES[usize::from(knot.mask)].sheets.vertices) - 1,
+            Style::Disjoint => -1,
         }
     }
 

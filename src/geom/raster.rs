@@ -37,7 +37,15 @@ pub trait Hits {
     /// The lattice edge that starts at lattice point `at` and runs one cell along `axis` is crossed, `offset` 65536ths of a
     /// cell from its start.
     fn hit(&mut self, axis: Axis, at: [u32; 3], offset: u16);
+
+    /// Whether no more hits are wanted: asked every [`ROWS`] rows of lattice lines, so that even the largest triangle soon ends.
+    fn is_enough(&self) -> bool {
+        false
+    }
 }
+
+/// Rows of a triangle between two looks at [`Hits::is_enough`]: some milliseconds in the finest grid, and more than a small triangle has.
+const ROWS: i64 = 16;
 
 /// Extra bits of the fixed-point depth below 1/65536 of a cell.
 const GUARD_BITS: u32 = 20;
@@ -125,6 +133,9 @@ impl Projection {
         // Many small triangles pass between the lines: the rest is worked out at the first hit.
         let mut plane = None;
         for row in 0..rows.1 - rows.0 {
+            if row % ROWS == ROWS - 1 && hits.is_enough() {
+                return;
+            }
             let (mut first, mut end) = (0, columns.1 - columns.0);
             for e in &edges {
                 let here = e.start + row * e.dv;

@@ -191,7 +191,7 @@ fn within(list: &[Key], brick: Key) -> Range<usize> {
 
 /// 1 for points and faces, -1 for edges and cells.
 fn alternating(extent: Extent) -> i64 {
-    if extent.dimension() % 2 == 0 { 1 } else { -1 }
+    if extent.dimension().is_multiple_of(2) { 1 } else { -1 }
 }
 
 /// The Euler number of the elements in some planes, by extent.

@@ -44,6 +44,8 @@ pub enum Warning {
     NothingEnclosed,
     /// So many triangles had corners that are not finite and were left out.
     SkippedTriangles(u64),
+    /// So many triangles were left out because they reach out of the grid, although the source's bounds did not say so.
+    OutsideTriangles(u64),
     /// The input has holes, and so many rings of cells were filled.
     HolesClosed(u64),
     /// On so many grid edges, coincident walls were counted as one.
@@ -64,6 +66,8 @@ impl fmt::Display for Warning {
             Warning::SkippedTriangles(n) => {
                 write!(f, "{n} triangles with coordinates that are not finite were left out")
             }
+            Warning::OutsideTriangles(1) => write!(f, "a triangle that reaches out of the grid was left out"),
+            Warning::OutsideTriangles(n) => write!(f, "{n} triangles that reach out of the grid were left out"),
             Warning::HolesClosed(1) => write!(f, "the surface was open: a hole was closed"),
             Warning::HolesClosed(n) => write!(f, "the surface was open: {n} holes, as the grid sees them, were closed"),
             Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (grid edges concerned: {n})"),

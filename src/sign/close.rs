@@ -31,6 +31,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What [`close`] did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -46,31 +47,48 @@ pub struct Closing {
 /// Switches edges until no face is odd, so that any input gets an inside.
 ///
 /// # Errors
-/// `Cancelled`.
+/// `Cancelled`, `Memory` when `progress` says so, and when more than 2^32 edges are crossed.
 pub fn close(crossings: Crossings, progress: &dyn Progress) -> Result<(Crossings, Closing)> {
-    let odd = crossings.odd_faces();
-    if odd.is_empty() {
+    let odd_faces = crossings.count_odd_faces();
+    if odd_faces == 0 {
         return Ok((crossings, Closing::default()));
     }
-    let rings = trace(&crossings, &odd);
+    let held = crossings.bytes() as u64 + odd_faces * ODD_FACE_BYTES;
+    progress.hold(held)?;
+    let odd = crossings.odd_faces();
+    let rings = trace(&crossings, &odd, progress)?;
+    drop(odd);
     progress.begin(Stage::Close, rings.len() as u64);
-    let mut closing = Closing { odd_faces: odd.len() as u64, rings: rings.len() as u64, switched: 0 };
+    let mut closing = Closing { odd_faces, rings: rings.len() as u64, switched: 0 };
+    let switched = AtomicU64::new(0);
+    // Asked while a patch grows.
+    let note = |switches: usize| {
+        check(progress)?;
+        let all = switched.fetch_add(switches as u64, Ordering::Relaxed) + switches as u64;
+        progress.hold(held + all * SWITCH_BYTES)
+    };
     let toggles: Result<Vec<Vec<Toggle>>> = rings
         .into_par_iter()
         .map(|ring| {
-            check(progress)?;
             let mut patch = Patch { crossings: &crossings, normal: DVec3::ZERO, toggles: Vec::new() };
-            patch.fill(ring);
+            patch.fill(ring, &note)?;
             progress.advance(1);
             Ok(patch.toggles)
         })
         .collect();
     let toggles = toggles?.concat();
     closing.switched = toggles.len() as u64;
-    let crossings = crossings.toggled(toggles);
-    debug_assert!(crossings.odd_faces().is_empty(), "filling all rings leaves no odd face");
+    let crossings = crossings.toggled_within(toggles, progress)?;
+    debug_assert_eq!(crossings.count_odd_faces(), 0, "filling all rings leaves no odd face");
     Ok((crossings, closing))
 }
+
+/// The most bytes for each odd face: listed (twice while the list is put together), under both its cells, as a step of the walk and of its
+/// ring, and as a step of the rings into which that is cut.
+const ODD_FACE_BYTES: u64 = 2 * 8 + 2 * 16 + 1 + 16 + 2 * size_of::<Step>() as u64;
+
+/// The most bytes for each switched edge: in a list that may be half empty, and in one list of all.
+const SWITCH_BYTES: u64 = 3 * size_of::<Toggle>() as u64;
 
 /// A cell of a ring, in finest cells, and the point where the ring leaves it for the next one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +101,7 @@ struct Step {
 type Ring = Vec<Step>;
 
 /// Takes the odd faces apart into simple rings: no cell occurs twice in one.
-fn trace(crossings: &Crossings, odd: &[Key]) -> Vec<Ring> {
+fn trace(crossings: &Crossings, odd: &[Key], progress: &dyn Progress) -> Result<Vec<Ring>> {
     // Each odd face under both its cells.
     let mut ends: Vec<(Key, u32)> =
         odd.iter().zip(0..).flat_map(|(face, i)| face.coboundary().map(move |cell| (cell, i))).collect();
@@ -95,12 +113,17 @@ fn trace(crossings: &Crossings, odd: &[Key]) -> Vec<Ring> {
     let mut walk: Vec<(Key, u32)> = Vec::new();
     let mut on_walk: hashbrown::HashMap<Key, usize, ahash::RandomState> =
         hashbrown::HashMap::with_hasher(ahash::RandomState::with_seeds(9, 10, 11, 12));
+    let mut steps = 0u64;
     for start in 0..odd.len() {
         let mut cell = odd[start].coboundary().next().expect("a face has a cell");
         if used[start] {
             continue;
         }
         loop {
+            steps += 1;
+            if steps.is_multiple_of(4096) {
+                check(progress)?;
+            }
             if let Some(&since) = on_walk.get(&cell) {
                 let ring = walk.split_off(since);
                 for (cell, _) in &ring {
@@ -120,7 +143,7 @@ fn trace(crossings: &Crossings, odd: &[Key]) -> Vec<Ring> {
             cell = odd[exit as usize].coboundary().find(|&next| next != cell).expect("an odd face has two cells");
         }
     }
-    rings
+    Ok(rings)
 }
 
 /// A step of a ring through an odd face: the ring passes it at the mean of the crossings of its edges.
@@ -159,7 +182,8 @@ struct Patch<'a> {
 }
 
 impl Patch<'_> {
-    fn fill(&mut self, ring: Ring) {
+    /// Fills the hole in `ring`; `note` is told of switches as they come, and may refuse.
+    fn fill(&mut self, ring: Ring, note: &dyn Fn(usize) -> Result<()>) -> Result<()> {
         let mut pending = vec![(ring, DVec3::ZERO)];
         while let Some((ring, whole)) = pending.pop() {
             let ring = shortened(ring);
@@ -168,9 +192,12 @@ impl Patch<'_> {
                 // area to speak of says nothing: such a part faces where the whole did.
                 let own = area_vector(&ring);
                 self.normal = if own.length_squared() > 1.0 { own } else { whole };
+                let before = self.toggles.len();
                 pending.extend(self.cut(ring, plane).into_iter().map(|part| (part, self.normal)));
+                note(self.toggles.len() - before)?;
             }
         }
+        Ok(())
     }
 
     /// Cuts a ring by a plane that it crosses: rings that lie on one side each.

@@ -12,4 +12,4 @@ mod walls;
 
 pub use close::{Closing, close};
 pub use parity::parity_signs;
-pub use scan::{Scan, ScanCounts, scan};
+pub use scan::{Scan, ScanCounts, expected_hits, scan};

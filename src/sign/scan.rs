@@ -11,15 +11,15 @@
 //! Cost: about 20 ns a hit in all; 8 bytes a hit until its block is resolved, then 2 or 4 (see
 //! [`Crossings`]). The triangles are not kept.
 
-use super::hits::{BlockCoords, Bucket, Hit, HitSorter, brick_coords, sort_hits};
+use super::hits::{BlockCoords, Bucket, Hit, HitSorter, Ledger, brick_coords, sort_hits};
 use super::walls;
 use crate::error::Result;
 use crate::geom::Frame;
-use crate::geom::raster::{FineTriangle, rasterise};
+use crate::geom::raster::{FineTriangle, Hits, rasterise};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
 use crate::mesh::{SourceCounts, TriangleSource};
-use crate::octree::crossings::{Builder, Crossings, Sample, Toggle, finest_element};
+use crate::octree::crossings::{self, Builder, Crossings, Sample, Toggle, finest_element};
 use crate::parallel::in_order;
 use crate::progress::{Progress, Stage, check};
 use glam::DVec3;
@@ -43,6 +43,8 @@ pub struct ScanCounts {
     pub source: SourceCounts,
     /// Triangles left out because a corner is not finite or lies outside of the root cube.
     pub skipped_triangles: u64,
+    /// Those of them whose corners are finite.
+    pub outside_triangles: u64,
     /// Crossings of triangles with lattice edges.
     pub hits: u64,
     /// Edges on which coincident walls, such as duplicate faces, were counted as one.
@@ -55,7 +57,7 @@ const TASK: usize = 2048;
 /// Finds all crossings of the source's triangles with the edges of the finest grid of `frame`.
 ///
 /// # Errors
-/// Whatever the source returns, and `Cancelled`.
+/// Whatever the source returns, `Cancelled`, `Memory` when `progress` says so, and when more than 2^32 edges are crossed.
 pub fn scan(
     source: &mut dyn TriangleSource,
     frame: &Frame,
@@ -63,30 +65,67 @@ pub fn scan(
     progress: &dyn Progress,
 ) -> Result<Scan> {
     progress.begin(Stage::Scan, source.size_hint().unwrap_or(0));
-    let sorters: Vec<_> = (0..rayon::current_num_threads()).map(|_| Mutex::new(HitSorter::new(with_normals))).collect();
-    let skipped = AtomicU64::new(0);
+    let ledger = Ledger::new(progress);
+    let sorters: Vec<_> =
+        (0..rayon::current_num_threads()).map(|_| Mutex::new(HitSorter::new(&ledger, with_normals))).collect();
+    let [skipped, outside] = [const { AtomicU64::new(0) }; 2];
     let counts = source.triangles(&mut |batch| {
         check(progress)?;
         let task = batch.len().div_ceil(4 * sorters.len()).clamp(1, TASK);
         batch.par_chunks(task).for_each(|triangles| {
             let thread = rayon::current_thread_index().unwrap_or(0) % sorters.len();
             let mut sorter = sorters[thread].lock().expect("rasterising does not panic");
-            let done = triangles.iter().filter(|t| rasterise_model(t, frame, &mut sorter)).count();
-            skipped.fetch_add((triangles.len() - done) as u64, Ordering::Relaxed);
+            for triangle in triangles {
+                if sorter.is_enough() {
+                    return;
+                }
+                if !rasterise_model(triangle, frame, &mut sorter) {
+                    skipped.fetch_add(1, Ordering::Relaxed);
+                    outside.fetch_add(u64::from(triangle.iter().all(|p| p.is_finite())), Ordering::Relaxed);
+                }
+            }
         });
+        ledger.result()?;
         progress.advance(batch.len() as u64);
         Ok(())
     })?;
+    let held = ledger.bytes();
     let sorters = sorters.into_iter().map(|s| s.into_inner().expect("rasterising does not panic"));
     let blocks = group_buckets(sorters);
-    let mut counts = ScanCounts { source: counts, skipped_triangles: skipped.into_inner(), ..ScanCounts::default() };
-    let crossings = resolve(blocks, frame.depth(), with_normals, &mut counts, progress)?;
+    let mut counts = ScanCounts {
+        source: counts,
+        skipped_triangles: skipped.into_inner(),
+        outside_triangles: outside.into_inner(),
+        ..ScanCounts::default()
+    };
+    let crossings = resolve(blocks, held, frame.depth(), with_normals, &mut counts, progress)?;
     Ok(Scan { crossings, counts })
+}
+
+/// How many hits are to be expected: the areas of the triangles' shadows along the three axes, in cells. Large numbers are right to a
+/// part in their root; of small and slanted triangles many have none, some have several. Cost: a pass over the source, 3 ns a triangle.
+///
+/// # Errors
+/// Whatever the source returns, and `Cancelled`.
+pub fn expected_hits(source: &mut dyn TriangleSource, frame: &Frame, progress: &dyn Progress) -> Result<f64> {
+    let to_cells = 1.0 / frame.cell_size();
+    let mut total = 0.0;
+    source.triangles(&mut |batch| {
+        check(progress)?;
+        for [a, b, c] in batch {
+            let twice_area = ((b - a) * to_cells).cross((c - a) * to_cells).abs().element_sum();
+            if twice_area.is_finite() {
+                total += 0.5 * twice_area;
+            }
+        }
+        Ok(())
+    })?;
+    Ok(total)
 }
 
 /// Rasterises a triangle in model coordinates; `false` if it cannot be placed in the grid.
 #[inline(never)]
-fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter) -> bool {
+fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter<'_>) -> bool {
     let [Some(a), Some(b), Some(c)] = triangle.map(|p| frame.snap(p)) else {
         return false;
     };
@@ -96,7 +135,7 @@ fn rasterise_model(triangle: &[DVec3; 3], frame: &Frame, sorter: &mut HitSorter)
 }
 
 /// The buckets of all threads, brought together by block, in Z-order of the blocks.
-fn group_buckets(sorters: impl Iterator<Item = HitSorter>) -> Vec<(BlockCoords, Vec<Bucket>)> {
+fn group_buckets<'a>(sorters: impl Iterator<Item = HitSorter<'a>>) -> Vec<(BlockCoords, Vec<Bucket>)> {
     let mut all: Vec<(BlockCoords, Bucket)> = sorters.flat_map(HitSorter::into_buckets).collect();
     all.sort_by_cached_key(|(block, _)| crate::grid::key::interleave(*block));
     let mut grouped: Vec<(BlockCoords, Vec<Bucket>)> = Vec::new();
@@ -118,10 +157,13 @@ struct Resolved {
     /// Switches that count coincident walls as one.
     merges: Vec<Toggle>,
     hits: u64,
+    /// Bytes that the block's buckets held.
+    freed: u64,
 }
 
 fn resolve(
     blocks: Vec<(BlockCoords, Vec<Bucket>)>,
+    mut held: u64,
     depth: u32,
     with_normals: bool,
     counts: &mut ScanCounts,
@@ -133,13 +175,15 @@ fn resolve(
         let block = blocks[n].lock().expect("locked once").take();
         let (block, buckets) = block.expect("each block is resolved once");
         hits.clear();
+        let freed = buckets.iter().map(Bucket::bytes).sum();
         buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
         let repeated = sort_hits(hits, spare);
-        resolve_block(block, hits, repeated, depth, with_normals)
+        Resolved { freed, ..resolve_block(block, hits, repeated, depth, with_normals) }
     };
     let mut builder = Builder::new(depth, with_normals);
     let mut merges = Vec::new();
     let append = |block: Resolved| {
+        crossings::check_count(builder.len() as u64 + block.offsets.len() as u64)?;
         let mut from = 0;
         for &(key, crossed) in &block.bricks {
             let to = from + crossed.iter().map(Plane::count).sum::<u32>() as usize;
@@ -149,13 +193,15 @@ fn resolve(
         }
         merges.extend(block.merges);
         counts.hits += block.hits;
-        Ok(())
+        held -= block.freed;
+        progress.hold(held + builder.bytes() as u64 + (merges.capacity() * size_of::<Toggle>()) as u64)
     };
     in_order(blocks.len(), progress, Default::default, resolve, append)?;
-    let crossings = builder.finish();
+    let crossings = builder.finish_within(progress)?;
+    progress.hold((crossings.bytes() + merges.len() * walls::BYTES) as u64)?;
     let merges = walls::worth_merging(&crossings, merges);
     counts.merged_walls = merges.len() as u64;
-    Ok(crossings.toggled(merges))
+    crossings.toggled_within(merges, progress)
 }
 
 /// Hits as close as this on one edge are one wall, in 65536ths of a cell: room for two roundings.

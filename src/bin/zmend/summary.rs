@@ -22,6 +22,8 @@ pub(crate) struct Summary<'a> {
     pub(crate) after: Side,
     pub(crate) options: Options,
     pub(crate) report: RepairReport,
+    /// What was asked for and made no difference, in words.
+    pub(crate) ignored: Vec<String>,
     /// Wall-clock time of each stage, and in total.
     pub(crate) times: Vec<(&'static str, Duration)>,
     pub(crate) peak_memory: Option<u64>,
@@ -29,7 +31,7 @@ pub(crate) struct Summary<'a> {
 
 impl Summary<'_> {
     pub(crate) fn print(&self) -> Result<()> {
-        let cells = 1u64 << self.options.depth;
+        let cells = 1u64 << self.report.frame.depth();
         let cell = units::real(self.report.frame.cell_size());
         let mut table = Table::default();
         table.line("", &["before", "after"].map(|s| Some(s.to_owned())));
@@ -66,8 +68,11 @@ impl Summary<'_> {
             "input": json::merged(json::side(&self.before), json::file(self.input)),
             "output": json::merged(json::side(&self.after), output),
             "options": {
-                "depth": self.options.depth,
+                "depth": frame.depth(),
+                "cell": self.options.cell,
                 "scale": self.options.scale,
+                "box": self.options.cube.map(|cube| json!({ "min": json::vector(cube.min), "size": cube.size })),
+                "max_memory": self.options.max_memory,
                 "surface": surface_name(self.options.surface),
                 "faces": format!("{:?}", self.options.faces).to_lowercase(),
                 "threads": rayon::current_num_threads(),
@@ -116,12 +121,13 @@ impl Summary<'_> {
     /// All that the user should know.
     fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.report.warnings.iter().map(ToString::to_string).collect();
+        warnings.extend_from_slice(&self.ignored);
         if self.input.trailing_bytes > 0 {
             let ignored = units::counted(self.input.trailing_bytes, "byte", "bytes");
             warnings.push(format!("{ignored} behind the end of the input's mesh were ignored"));
         }
         if self.loses_digits {
-            let problem = "binary STL files hold 7 digits, too few for cells so small so far from the origin";
+            let problem = "files of this format hold 7 digits, too few for cells so small so far from the origin";
             warnings.push(format!("{problem}: vertices may fall together; write PLY instead"));
         }
         if let Some(measured) = &self.after.measured
@@ -136,7 +142,7 @@ impl Summary<'_> {
     }
 }
 
-fn surface_name(surface: Surface) -> &'static str {
+pub(crate) fn surface_name(surface: Surface) -> &'static str {
     match surface {
         Surface::MarchingCubes => "mc",
         Surface::DualContouring => "dc",

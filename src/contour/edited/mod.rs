@@ -44,15 +44,18 @@ mod tests;
 mod touched;
 
 use super::dual::{DualOptions, check_normals, contour, dual_contouring};
-use super::layout::{KnotVertices, Layout};
+use super::layout::{BRICK_BYTES, Layout, Style};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::EditedOctree;
-use crate::progress::{Progress, check};
+use crate::progress::{Progress, Stage, check};
 use polygons::Patch;
 use seam::Seam;
 use touched::Touched;
+
+/// Bytes for each vertex of a touched cell: its cell, polygons and neighbours, and its positions before and after a round.
+const VERTEX_BYTES: usize = 320;
 
 /// Passes the surface of an edited octree to `sink`; returns its size. It is closed, manifold and oriented outward, with the topology of the
 /// solid thickened a little, whatever the edits. Without any it is exactly that of [`dual_contouring`]; with edits, vertices and polygons of
@@ -63,14 +66,14 @@ use touched::Touched;
 /// edits, [`Intersections::Avoid`](super::Intersections::Avoid) is not heeded.
 ///
 /// # Errors
-/// Whatever `sink` returns, and `Cancelled`.
+/// Whatever `sink` returns, `Cancelled`, `Memory` when `progress` says so, and when there are more than 2^32 vertices.
 ///
 /// # Panics
 /// When the complex is not closed ([`EditedOctree::validate`]), or sharp features are asked for and the octree has no normals.
 pub fn dual_contouring_edited(
     octree: &EditedOctree,
     frame: &Frame,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
@@ -79,10 +82,13 @@ pub fn dual_contouring_edited(
         return dual_contouring(signed, frame, options, sink, progress);
     }
     check_normals(signed.crossings(), options);
-    check(progress)?;
-    let layout = Layout::new(signed, KnotVertices::OfCase);
+    let bricks = signed.crossings().bricks().len();
+    progress.begin(Stage::Contour, 2 * bricks as u64);
+    let bytes = signed.bytes() + bricks * BRICK_BYTES;
+    progress.hold(bytes as u64)?;
+    let layout = Layout::new(signed, Style::Usual)?;
     let touched = Touched::new(octree);
-    check(progress)?;
+    progress.hold((bytes + touched.vertices as usize * VERTEX_BYTES) as u64)?;
     let patch = Patch::new(&touched, &layout);
     let polygons = patch.polygons();
     check(progress)?;

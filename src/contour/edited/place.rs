@@ -35,7 +35,7 @@ struct Moving {
 /// `fixed` their positions. Cost: some 0.3 us a vertex, in parallel.
 pub(super) fn place(
     crossings: &Crossings,
-    placement: Placement,
+    placement: Placement<'_>,
     patch: &Patch<'_>,
     polygons: &Polygons,
     ring: &[u32],

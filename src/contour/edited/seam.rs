@@ -18,7 +18,7 @@ pub(super) struct Seam<'a> {
     polygons: &'a Polygons,
     /// What the edited surface will have.
     sizes: MeshSizes,
-    options: DualOptions,
+    options: DualOptions<'a>,
     /// Vertices of the unedited surface that have passed, those of them that were dropped, and those of the ring.
     passed: u32,
     dropped: usize,
@@ -36,7 +36,7 @@ impl<'a> Seam<'a> {
         frame: &'a Frame,
         (patch, polygons): (&'a Patch<'a>, &'a Polygons),
         sizes: MeshSizes,
-        options: DualOptions,
+        options: DualOptions<'a>,
     ) -> Self {
         let mut ring: Vec<u32> = polygons.sides().map(|[from, _]| from).filter(|&v| v < patch.kept).collect();
         ring.sort_unstable();
