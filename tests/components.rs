@@ -155,7 +155,8 @@ fn surfaces(octree: &SignedOctree) -> Vec<Mesh> {
     let frame = Frame::new(DVec3::ZERO, 1.0, DEPTH).expect("a frame");
     let (mut mc, mut dc) = (Mesh::default(), Mesh::default());
     marching_cubes(octree, &frame, &mut mc, &Silent).expect("in memory");
-    let options = DualOptions { placement: Placement::MassPoint, triangles: false, intersections: Intersections::Allow };
+    let options =
+        DualOptions { placement: Placement::MassPoint, triangles: false, intersections: Intersections::Allow };
     dual_contouring(octree, &frame, &options, &mut dc, &Silent).expect("in memory");
     vec![mc, dc]
 }
