@@ -95,6 +95,7 @@ pub mod progress;
 pub mod render;
 pub mod repair;
 pub mod sign;
+pub mod topology;
 
 pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
