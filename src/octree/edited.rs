@@ -46,6 +46,14 @@ impl EditedOctree {
         EditedOctree { signed, removed, added }
     }
 
+    /// With further elements added, or removed; those that the other list has are taken out of it.
+    #[must_use]
+    pub fn with(self, elements: Vec<Key>, add: bool) -> Self {
+        let EditedOctree { signed, mut removed, mut added } = self;
+        if add { added.extend(elements) } else { removed.extend(elements) }
+        EditedOctree::new(signed, removed, added)
+    }
+
     /// The solid of the signs, without any edit.
     pub fn unedited(signed: SignedOctree) -> Self {
         EditedOctree { signed, removed: Vec::new(), added: Vec::new() }
@@ -135,6 +143,20 @@ impl EditedOctree {
                 }
             }
         }
+    }
+
+    /// The number of finest cells that are removed, or beside an edited face: what the edits have touched.
+    pub fn changed_cells(&self) -> u64 {
+        let edits = self.removed.iter().chain(&self.added);
+        let mut cells: Vec<Key> = edits
+            .flat_map(|&key| {
+                let beside = (key.dir().dimension() == 2).then(|| key.coboundary());
+                beside.into_iter().flatten().chain(key.is_cell().then_some(key))
+            })
+            .collect();
+        cells.par_sort_unstable();
+        cells.dedup();
+        cells.len() as u64
     }
 
     /// The Euler number of the solid: points less edges plus faces less cells. Cost: 50 ns a brick, in parallel; bricks that are wholly

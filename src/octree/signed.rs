@@ -130,6 +130,16 @@ impl SignedOctree {
         SignedOctree::from_crossings(builder.finish())
     }
 
+    /// An octree of which nothing is inside.
+    pub fn empty(depth: u32) -> Self {
+        SignedOctree { crossings: Builder::new(depth, false).finish(), inside: Vec::new() }
+    }
+
+    /// Crossings and signs, as [`new`](Self::new) takes them.
+    pub fn into_parts(self) -> (Crossings, Vec<Plane>) {
+        (self.crossings, self.inside)
+    }
+
     /// The crossed edges.
     pub fn crossings(&self) -> &Crossings {
         &self.crossings

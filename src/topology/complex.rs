@@ -325,6 +325,12 @@ impl Complex {
         (brick < DEEP).then_some(Spot { brick, extent, local })
     }
 
+    /// The elements of a brick as they were before anything was removed; `octree` is what the complex was made of.
+    pub(super) fn before_thinning(&self, octree: &EditedOctree, brick: u32) -> Planes {
+        let key = self.bricks[brick as usize].key;
+        self.turned(key, octree.elements(key))
+    }
+
     /// Opens the brick on one side if it is full and has not been opened. Its place, if there is any.
     pub(super) fn open(&mut self, brick: u32, face: Face) -> Option<u32> {
         match self.beside(brick, face) {

@@ -23,7 +23,8 @@ pub(super) struct Labels {
     first: Vec<u32>,
     /// Connected within their brick, disjoint.
     parts: Vec<Plane>,
-    /// By part, gap after the parts, the least node of its set. Node 0 is the sentinel, node n + 1 is part n.
+    rows: Rows,
+    /// By node, the least node of its set. Node 0 is the sentinel, node n + 1 is part n, then come the gaps.
     roots: Vec<u32>,
 }
 
@@ -44,9 +45,8 @@ impl Labels {
             parts.extend(set);
         }
         first.push(parts.len() as u32);
-        let labels = Labels { first, parts, roots: Vec::new() };
-        let mut union = Union { labels, complex, parent: Vec::new(), rows: Vec::new() };
-        union.list_gaps();
+        let (rows, nodes) = Rows::new(complex, parts.len() as u32 + 1);
+        let mut union = Union { complex, first, parts, rows, parent: (0..nodes).collect() };
         union.join_gaps();
         for (brick, joins) in (0..).zip(&joins) {
             union.join_brick(brick, joins);
@@ -82,13 +82,16 @@ impl Labels {
         (1..).zip(&self.roots[1..]).filter(|(node, root)| node == *root).map(|(node, _)| node).collect()
     }
 
-    /// By name of a set, the number of full bricks in the gaps that belong to it. (Only the volumes of sets ask.)
-    pub(super) fn deep_bricks(&self, complex: &Complex) -> Vec<u64> {
-        let mut union = Union::again(self, complex);
-        union.list_gaps();
+    /// The set of the full brick, not opened, on one side of a brick.
+    pub(super) fn set_beside(&self, complex: &Complex, brick: u32, face: Face) -> u32 {
+        self.roots[self.rows.gap_beside(complex, brick, face) as usize]
+    }
+
+    /// By name of a set, the number of its full bricks that were not opened; of the sentinel's, only some.
+    pub(super) fn deep_bricks(&self) -> Vec<u64> {
         let mut count = vec![0; self.names()];
-        for i in 0..union.rows.len() {
-            if let Some((node, from, to)) = union.gap_after(i) {
+        for i in 0..self.rows.entries.len() {
+            if let Some((node, from, to)) = self.rows.gap_after(i) {
                 count[self.roots[node as usize] as usize] += u64::from(to - from);
             }
         }
@@ -132,83 +135,90 @@ struct Entry {
     gap: u32,
 }
 
-struct Union<'a> {
-    labels: Labels,
-    complex: &'a Complex,
-    parent: Vec<u32>,
-    rows: Vec<Entry>,
+/// The listed bricks by rows, and the gaps between them.
+#[derive(Debug)]
+struct Rows {
+    entries: Vec<Entry>,
+    /// Bricks in a row of the box.
+    length: u32,
 }
 
-impl<'a> Union<'a> {
-    /// As it was before the parts were joined, to ask for gaps once more.
-    fn again(labels: &Labels, complex: &'a Complex) -> Self {
-        let labels = Labels { first: labels.first.clone(), parts: labels.parts.clone(), roots: Vec::new() };
-        Union { labels, complex, parent: Vec::new(), rows: Vec::new() }
-    }
-
-    fn list_gaps(&mut self) {
-        let complex = self.complex;
+impl Rows {
+    /// Numbers the gaps from `nodes` on; also returns the number after the last.
+    fn new(complex: &Complex, mut nodes: u32) -> (Rows, u32) {
         let entry = |brick: u32| {
             let [x, y, z] = complex.position(brick);
             Entry { row: [y, z], x, brick, gap: NOTHING }
         };
-        self.rows = (0..complex.bricks.len() as u32).map(entry).collect();
-        self.rows.par_sort_unstable();
-        let mut nodes = self.labels.parts.len() as u32 + 1;
-        for i in 0..self.rows.len() {
-            let entry = self.rows[i];
-            if complex.beside(entry.brick, Face::new(Axis::X, true)) == DEEP {
-                let is_last = self.rows.get(i + 1).is_none_or(|next| next.row != entry.row);
-                self.rows[i].gap = if is_last { SENTINEL } else { nodes };
+        let mut entries: Vec<Entry> = (0..complex.bricks.len() as u32).map(entry).collect();
+        entries.par_sort_unstable();
+        for i in 0..entries.len() {
+            if complex.beside(entries[i].brick, Face::new(Axis::X, true)) == DEEP {
+                let is_last = entries.get(i + 1).is_none_or(|next| next.row != entries[i].row);
+                entries[i].gap = if is_last { SENTINEL } else { nodes };
                 nodes += u32::from(!is_last);
             }
         }
-        self.parent = (0..nodes).collect();
+        (Rows { entries, length: complex.extents()[0] }, nodes)
     }
 
     /// The gap after an entry: its node, and its bricks.
     fn gap_after(&self, i: usize) -> Option<(u32, u32, u32)> {
-        let entry = self.rows[i];
-        let next = self.rows.get(i + 1).filter(|next| next.row == entry.row);
-        let end = next.map_or(self.complex.extents()[0], |next| next.x);
+        let entry = self.entries[i];
+        let next = self.entries.get(i + 1).filter(|next| next.row == entry.row);
+        let end = next.map_or(self.length, |next| next.x);
         (entry.gap != NOTHING).then_some((entry.gap, entry.x + 1, end))
     }
 
-    /// The first entry after a place in a row.
-    fn after(&self, row: [u32; 2], x: u32) -> usize {
-        self.rows.partition_point(|entry| (entry.row, entry.x) < (row, x))
+    /// The first entry that is not before a place in a row.
+    fn from(&self, row: [u32; 2], x: u32) -> usize {
+        self.entries.partition_point(|entry| (entry.row, entry.x) < (row, x))
     }
 
-    /// The node of the gap around an unopened brick.
-    fn gap_at(&self, [x, y, z]: [u32; 3]) -> u32 {
-        let after = self.after([y, z], x);
-        match after.checked_sub(1).map(|i| self.rows[i]) {
+    /// The node of the gap around the unopened brick on one side of a brick.
+    fn gap_beside(&self, complex: &Complex, brick: u32, face: Face) -> u32 {
+        let mut at = complex.position(brick);
+        let c = &mut at[face.axis().index()];
+        *c = if face.is_high() { *c + 1 } else { *c - 1 };
+        let [x, y, z] = at;
+        match self.from([y, z], x).checked_sub(1).map(|i| self.entries[i]) {
             Some(entry) if entry.row == [y, z] => entry.gap,
             _ => SENTINEL,
         }
     }
+}
 
+struct Union<'a> {
+    complex: &'a Complex,
+    first: Vec<u32>,
+    parts: Vec<Plane>,
+    rows: Rows,
+    parent: Vec<u32>,
+}
+
+impl Union<'_> {
     /// Joins gaps of neighbouring rows where they lie beside each other.
     fn join_gaps(&mut self) {
         let [_, height, depth] = self.complex.extents();
-        for i in 0..self.rows.len() {
-            let Some((node, from, to)) = self.gap_after(i) else { continue };
-            let [y, z] = self.rows[i].row;
+        for i in 0..self.rows.entries.len() {
+            let Some((node, from, to)) = self.rows.gap_after(i) else { continue };
+            let [y, z] = self.rows.entries[i].row;
             for row in [[y.wrapping_sub(1), z], [y + 1, z], [y, z.wrapping_sub(1)], [y, z + 1]] {
                 if row[0] >= height || row[1] >= depth {
                     // The gap lies on the boundary of the box.
                     self.join(node, SENTINEL);
                     continue;
                 }
-                let mut place = self.after(row, from);
-                let before = place.checked_sub(1).filter(|&i| self.rows[i].row == row);
+                let mut place = self.rows.from(row, from);
+                let before = place.checked_sub(1).filter(|&i| self.rows.entries[i].row == row);
                 let is_there = |entry: Option<&Entry>| entry.is_some_and(|entry| entry.row == row && entry.x == from);
-                if !is_there(self.rows.get(place)) {
-                    self.join(node, before.map_or(SENTINEL, |i| self.rows[i].gap));
+                if !is_there(self.rows.entries.get(place)) {
+                    self.join(node, before.map_or(SENTINEL, |i| self.rows.entries[i].gap));
                 }
-                while let Some(entry) = self.rows.get(place).filter(|entry| entry.row == row && entry.x + 1 < to) {
-                    if entry.gap != NOTHING {
-                        self.join(node, entry.gap);
+                while let Some(entry) = self.rows.entries.get(place).filter(|entry| entry.row == row && entry.x + 1 < to) {
+                    let gap = entry.gap;
+                    if gap != NOTHING {
+                        self.join(node, gap);
                     }
                     place += 1;
                 }
@@ -225,7 +235,7 @@ impl<'a> Union<'a> {
                 self.join_parts(brick, |part| !(*part & missing_start).is_empty(), SENTINEL);
             }
             if self.complex.beside(brick, Face::new(axis, false)) == DEEP {
-                let gap = self.gap_beside(brick, axis, false);
+                let gap = self.rows.gap_beside(self.complex, brick, Face::new(axis, false));
                 self.join_parts(brick, |part| part.low_layer(axis) != 0, gap);
             }
             let leaving = along.high_layer(axis);
@@ -234,7 +244,7 @@ impl<'a> Union<'a> {
                 continue;
             }
             if high == DEEP {
-                let gap = self.gap_beside(brick, axis, true);
+                let gap = self.rows.gap_beside(self.complex, brick, Face::new(axis, true));
                 self.join_parts(brick, |part| part.high_layer(axis) & leaving != 0, gap);
                 continue;
             }
@@ -243,8 +253,8 @@ impl<'a> Union<'a> {
                 self.join_parts(brick, |part| part.high_layer(axis) & leaving & !there != 0, SENTINEL);
             }
             if high < DEEP {
-                for n in self.labels.first[high as usize]..self.labels.first[high as usize + 1] {
-                    let met = self.labels.parts[n as usize].low_layer(axis) & leaving;
+                for n in self.first[high as usize]..self.first[high as usize + 1] {
+                    let met = self.parts[n as usize].low_layer(axis) & leaving;
                     if met != 0 {
                         self.join_parts(brick, |part| part.high_layer(axis) & met != 0, n + 1);
                     }
@@ -253,17 +263,10 @@ impl<'a> Union<'a> {
         }
     }
 
-    fn gap_beside(&self, brick: u32, axis: Axis, high: bool) -> u32 {
-        let mut at = self.complex.position(brick);
-        let c = &mut at[axis.index()];
-        *c = if high { *c + 1 } else { *c - 1 };
-        self.gap_at(at)
-    }
-
     /// Joins a node with those parts of a brick for which the answer is yes.
     fn join_parts(&mut self, brick: u32, which: impl Fn(&Plane) -> bool, node: u32) {
-        for part in self.labels.first[brick as usize]..self.labels.first[brick as usize + 1] {
-            if which(&self.labels.parts[part as usize]) {
+        for part in self.first[brick as usize]..self.first[brick as usize + 1] {
+            if which(&self.parts[part as usize]) {
                 self.join(part + 1, node);
             }
         }
@@ -286,7 +289,6 @@ impl<'a> Union<'a> {
 
     fn finish(mut self) -> Labels {
         let roots = (0..self.parent.len() as u32).map(|node| self.root(node)).collect();
-        self.labels.roots = roots;
-        self.labels
+        Labels { first: self.first, parts: self.parts, rows: self.rows, roots }
     }
 }

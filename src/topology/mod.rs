@@ -1,9 +1,22 @@
 //! Topology repair.
-pub mod betti;
-pub mod complex;
+mod betti;
+mod complex;
 mod label;
-pub mod thin;
+mod mend;
 #[cfg(test)]
 mod oracle;
+mod patch;
+mod section;
+mod skeleton;
+mod span;
+#[cfg(test)]
+mod tests;
+mod thin;
+mod volumes;
+
 pub use betti::Betti;
 pub use complex::{Complex, Side};
+pub use mend::{Handle, Kind, Loops, Options, TopologyReport, handles, repair_topology};
+pub use skeleton::{Arc, Node, Skeleton};
+pub use thin::{Thinned, thin};
+pub use volumes::{move_small, volumes};
