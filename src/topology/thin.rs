@@ -63,6 +63,17 @@ const PAIRS: [(Extent, Axis); 12] = {
     pairs
 };
 
+/// The axes along which cells may be eroded, step by step: twice all of them, then one after the other. The first moves a front with
+/// normal n by max |n_i| (the ball of the L1 metric), the second by the sum of |n_i| (that of the maximum metric); two to one, a front
+/// moves by 3, 2.83 and 2.89 cells in five steps along the axes and their two kinds of diagonals. So fronts meet where Euclidean ones
+/// would, to a few percent, and cross-sections stand straight.
+const ERODED: [Extent; 5] =
+    [Extent::CELL, Extent::CELL, axis_alone(Axis::X), axis_alone(Axis::Y), axis_alone(Axis::Z)];
+
+const fn axis_alone(axis: Axis) -> Extent {
+    Extent::POINT.with(axis)
+}
+
 /// Bricks that a thread takes at least.
 const GRAIN: usize = 64;
 
@@ -76,14 +87,21 @@ pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress)
     let mut place_of = Vec::new();
     loop {
         check(progress)?;
-        let erode = layers.is_none_or(|layers| done.steps < layers);
+        let axes = ERODED[done.steps as usize % ERODED.len()];
+        let erode = if layers.is_none_or(|layers| done.steps < layers) { Some(axes) } else { None };
         let mut marks: Vec<Marks> =
             active.par_iter().with_min_len(GRAIN).filter_map(|&brick| Marks::of(complex, brick, erode)).collect();
         if marks.is_empty() {
             return Ok(done);
         }
-        let step = Step::new(complex, &mut marks, &mut place_of);
+        // Faces whose turn has not come yet are waited for.
+        let waiting: Vec<u32> = marks.iter().filter(|marks| marks.waiting).map(|marks| marks.brick).collect();
+        marks.retain(|marks| marks.kinds != 0);
+        let step = Step::new(complex, &marks, &mut place_of);
         done.removed += step.run(complex, &mut active);
+        active.extend(waiting);
+        active.sort_unstable();
+        active.dedup();
         done.steps += 1;
         progress.advance(1);
     }
@@ -113,19 +131,21 @@ struct Marks {
     brick: u32,
     /// By extent; bit e is set where plane e is not empty.
     kinds: u8,
+    /// Whether there are faces that would be marked if erosion went along their normal in this step.
+    waiting: bool,
     planes: Box<[Plane; 7]>,
 }
 
 impl Marks {
-    /// None if there are no such elements.
-    fn of(complex: &Complex, brick: u32, erode: bool) -> Option<Marks> {
+    /// None if there are no such elements, nor any that wait.
+    fn of(complex: &Complex, brick: u32, erode: Option<Extent>) -> Option<Marks> {
         let live = complex.live(brick);
         let low = Axis::ALL.map(|axis| complex.live(complex.beside(brick, Face::new(axis, false))));
         let mut planes = [Plane::EMPTY; 7];
-        let mut kinds = 0;
+        let (mut kinds, mut waiting) = (0, false);
         for extent in &Extent::ALL[..7] {
             let here = live[extent.index()];
-            if here.is_empty() || extent.dimension() == 2 && !erode {
+            if here.is_empty() || extent.dimension() == 2 && erode.is_none() {
                 continue;
             }
             let (mut once, mut twice) = (Plane::EMPTY, Plane::EMPTY);
@@ -139,10 +159,15 @@ impl Marks {
                 once |= below;
             }
             let marked = here & once & !twice;
+            let normal = extent.complement().axes().next().expect("not a cell");
+            if extent.dimension() == 2 && erode.is_none_or(|axes| !axes.contains(normal)) {
+                waiting |= !marked.is_empty();
+                continue;
+            }
             kinds |= u8::from(!marked.is_empty()) << extent.index();
             planes[extent.index()] = marked;
         }
-        (kinds != 0).then(|| Marks { brick, kinds, planes: Box::new(planes) })
+        (kinds != 0 || waiting).then(|| Marks { brick, kinds, waiting, planes: Box::new(planes) })
     }
 }
 
@@ -166,7 +191,7 @@ struct Step<'a> {
 }
 
 impl<'a> Step<'a> {
-    fn new(complex: &mut Complex, marks: &'a mut [Marks], place_of: &'a mut Vec<u32>) -> Self {
+    fn new(complex: &mut Complex, marks: &'a [Marks], place_of: &'a mut Vec<u32>) -> Self {
         let mut uppers: Vec<u32> = Vec::with_capacity(marks.len() + marks.len() / 2);
         for mark in marks.iter() {
             uppers.push(mark.brick);
@@ -246,8 +271,6 @@ impl<'a> Step<'a> {
                 }
             }
         }
-        active.sort_unstable();
-        active.dedup();
         removed
     }
 }
