@@ -129,7 +129,7 @@ impl Loops {
         let mut complex = Complex::new(octree, side);
         thin(&mut complex, layers(limit), progress)?;
         let skeleton = Skeleton::new(&complex);
-        let found = loops(&complex, &skeleton, progress)?;
+        let found = loops(octree, &complex, &skeleton, progress)?;
         Ok(Loops { complex, skeleton, found })
     }
 
@@ -165,7 +165,7 @@ impl Loops {
 
 /// Layers of erosion after which no section of that area has a cell left: its inradius is at most that of the disc, and the front moves by at
 /// least a cell's side in every sqrt(3) layers. Two more for the grid.
-fn layers(limit: f64) -> Option<u32> {
+pub fn layers(limit: f64) -> Option<u32> {
     let layers = (limit / std::f64::consts::PI).sqrt() * 3f64.sqrt() + 2.0;
     (layers < f64::from(1 << 20)).then(|| layers.ceil() as u32)
 }

@@ -16,7 +16,7 @@ mod volumes;
 
 pub use betti::Betti;
 pub use complex::{Complex, Side};
-pub use mend::{Handle, Kind, Loops, Options, TopologyReport, handles, repair_topology};
+pub use mend::{Handle, Kind, Loops, Options, TopologyReport, handles, layers, repair_topology};
 pub use skeleton::{Arc, Node, Skeleton};
 pub use thin::{Thinned, thin};
 pub use volumes::{move_small, volumes};

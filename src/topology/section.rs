@@ -10,15 +10,20 @@
 //! - the surface has no boundary but on the boundary of the solid, so that the sum of its oriented unit squares, its VECTOR AREA,
 //!   depends on that curve alone: staircases do not count, whichever way the handle runs.
 //!
-//! In the background the squares are faces of the grid, and those at the rim lie partly in the solid: each counts with the part of its
-//! four corners that is outside. (An edge of the solid has both ends inside, so that no square of a cut needs that.)
+//! The corners of the squares are cells (of the dual, for a background). Where such a cell does not belong to the complex, the rim of the
+//! section is there, and the corner is moved onto the surface of the solid as the signs have it: to the mean of the middles of the crossed
+//! edges of that cell of the grid, or at that point of the grid. Otherwise slanted sections, whose rim runs through notches, would
+//! seem smaller than straight ones.
 //!
-//! Cost: some 150 ns an edge of the section.
+//! Cost: some 200 ns an edge of the section.
 
-use super::complex::{Complex, Side, Spot};
-use crate::grid::{Extent, Face};
+use super::complex::{Brick, Complex, DEEP, NOTHING, Side, Spot};
+use crate::grid::brick::{Local, Plane};
+use crate::grid::{Axis, Corner, Edge, Extent, Face};
+use crate::octree::EditedOctree;
 use ahash::RandomState;
 use hashbrown::HashMap;
+use rayon::prelude::*;
 
 /// The cross-section at an edge of the skeleton.
 #[derive(Debug, Clone)]
@@ -32,17 +37,20 @@ pub(super) struct Section {
 }
 
 impl Section {
-    /// The section through an edge that no face is left at.
-    pub(super) fn of(complex: &Complex, edge: Spot) -> Section {
+    /// The section through an edge that no face is left at; `signs` are those of the complex.
+    pub(super) fn of(signs: &Signs, complex: &Complex, edge: Spot) -> Section {
         let flow = Flow::into(complex, edge);
         let phi = flow.phi();
+        let rim = Rim { signs, complex };
         let mut vector = [0.0; 3];
         let mut centre = [0.0; 3];
         for (&spot, &phi) in flow.edges.iter().zip(&phi) {
-            let axis = spot.extent.axes().next().expect("an edge has an axis");
-            vector[axis.index()] += phi as f64 * part_outside(complex, spot);
+            let square = rim.square(spot);
             let at = complex.key(spot).center();
-            (0..3).for_each(|a| centre[a] += f64::from(at[a]));
+            for a in 0..3 {
+                vector[a] += phi as f64 * square[a];
+                centre[a] += f64::from(at[a]);
+            }
         }
         let squares = flow.edges.len() as u64;
         Section {
@@ -53,21 +61,108 @@ impl Section {
     }
 }
 
-/// The part of a square that counts.
-fn part_outside(complex: &Complex, edge: Spot) -> f64 {
-    if complex.side() == Side::Object {
-        return 1.0;
+/// The signs of a complex's points of the grid, by brick, in the complex's own coordinates.
+pub(super) struct Signs(Vec<Plane>);
+
+impl Signs {
+    /// Cost: a hash probe a brick, in parallel.
+    pub(super) fn new(octree: &EditedOctree, complex: &Complex) -> Signs {
+        let signed = octree.signed();
+        let of = |brick: &Brick| {
+            let plane = match signed.crossings().find(brick.key) {
+                Some(i) => signed.inside()[i],
+                None if octree.is_uniformly_inside(brick.key) => Plane::FULL,
+                None => Plane::EMPTY,
+            };
+            if complex.side() == Side::Object { plane } else { plane.turned_over() }
+        };
+        Signs(complex.bricks.par_iter().map(of).collect())
     }
-    let [u, v] = edge.extent.axes().next().expect("an edge has an axis").others();
-    let mut corners = 0;
-    for (a, b) in [(false, false), (false, true), (true, false), (true, true)] {
-        let cell = complex.half_toward(edge, Face::new(u, a)).and_then(|face| complex.half_toward(face, Face::new(v, b)));
-        corners += u32::from(cell.is_some_and(|cell| {
-            let was = complex.bricks[cell.brick as usize].record.as_deref().and_then(|r| r.face_of(cell.local));
-            was.is_some() || complex.get(cell)
-        }));
+
+    /// The sign of a point, some steps of -1, 0 or 1 from the start of a brick's position.
+    fn at(&self, complex: &Complex, mut brick: u32, local: Local, steps: [i32; 3]) -> bool {
+        let mut at = local.coords();
+        for (axis, step) in Axis::ALL.into_iter().zip(steps) {
+            let moved = at[axis.index()] as i32 + step;
+            if !(0..8).contains(&moved) {
+                brick = match complex.beside(brick, Face::new(axis, step > 0)) {
+                    NOTHING => return false,
+                    DEEP => return complex.side() == Side::Object,
+                    next => next,
+                };
+            }
+            at[axis.index()] = (moved & 7) as u32;
+        }
+        self.0[brick as usize].get(Local::new(at[0], at[1], at[2]))
     }
-    f64::from(corners) / 4.0
+}
+
+/// The corners of squares, at the rim moved onto the surface.
+struct Rim<'a> {
+    signs: &'a Signs,
+    complex: &'a Complex,
+}
+
+impl Rim<'_> {
+    /// The vector area of the square across an edge.
+    fn square(&self, edge: Spot) -> [f64; 3] {
+        let axis = edge.extent.axes().next().expect("an edge has an axis");
+        let [u, v] = axis.others();
+        // Half the cross product of the diagonals, from (low, low) to (high, high) and from (high, low) to (low, high).
+        let mut diagonals = [[0.0; 3]; 2];
+        for (second, sign, high_u, high_v) in
+            [(0, 1.0, true, true), (0, -1.0, false, false), (1, 1.0, false, true), (1, -1.0, true, false)]
+        {
+            let diagonal = &mut diagonals[second];
+            diagonal[u.index()] += sign * if high_u { 0.5 } else { -0.5 };
+            diagonal[v.index()] += sign * if high_v { 0.5 } else { -0.5 };
+            let face = self.complex.half_toward(edge, Face::new(u, high_u));
+            if let Some(cell) = face.and_then(|face| self.complex.half_toward(face, Face::new(v, high_v))) {
+                let moved = self.moved(cell);
+                (0..3).for_each(|a| diagonal[a] += sign * moved[a]);
+            }
+        }
+        let [p, q] = diagonals;
+        std::array::from_fn(|a| {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            (p[b] * q[c] - p[c] * q[b]) / 2.0
+        })
+    }
+
+    /// How far the corner in a cell of the complex's coordinates is moved.
+    fn moved(&self, cell: Spot) -> [f64; 3] {
+        let complex = self.complex;
+        let record = complex.bricks[cell.brick as usize].record.as_deref();
+        if complex.get(cell) || record.is_some_and(|record| record.face_of(cell.local).is_some()) {
+            return [0.0; 3];
+        }
+        let sign = |steps| self.signs.at(complex, cell.brick, cell.local, steps);
+        let (mut sum, mut crossed) = ([0.0; 3], 0u32);
+        match complex.side() {
+            Side::Object => {
+                let corners = Corner::ALL.map(|corner| sign(Axis::ALL.map(|axis| i32::from(corner.is_high(axis)))));
+                for edge in Edge::ALL {
+                    let [from, to] = edge.corners();
+                    if corners[from.index()] != corners[to.index()] {
+                        crossed += 1;
+                        for axis in Axis::ALL.into_iter().filter(|&axis| axis != edge.axis()) {
+                            sum[axis.index()] += if from.is_high(axis) { 0.5 } else { -0.5 };
+                        }
+                    }
+                }
+            }
+            Side::Background => {
+                for face in Face::ALL {
+                    let step = if face.is_high() { 1 } else { -1 };
+                    if !sign(Axis::ALL.map(|axis| if axis == face.axis() { step } else { 0 })) {
+                        crossed += 1;
+                        sum[face.axis().index()] += 0.5 * f64::from(step);
+                    }
+                }
+            }
+        }
+        sum.map(|sum| sum / f64::from(crossed.max(1)))
+    }
 }
 
 /// The edges that flowed into one, and how.

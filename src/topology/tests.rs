@@ -55,3 +55,34 @@ fn tori_in_all_directions_are_cut_and_filled_where_they_are() {
         if false {assert!((0.9..1.1).contains(&cut) && (0.9..1.1).contains(&fill), "{axis:?}: {cut}, {fill}");}
     }
 }
+
+#[test]
+#[ignore = "printout"]
+fn gyroid() {
+    let k = 8.0 * std::f64::consts::PI;
+    for depth in [6u32, 7, 8] {
+        let n = f64::from(1u32 << depth);
+        let signed = octree(depth, |p| {
+            let q = p.map(|c| f64::from(c) / n);
+            let g = (k * q[0]).sin() * (k * q[1]).cos() + (k * q[1]).sin() * (k * q[2]).cos() + (k * q[2]).sin() * (k * q[0]).cos();
+            let r: f64 = q.iter().map(|c| (c - 0.5) * (c - 0.5)).sum::<f64>().sqrt();
+            g.abs() < 0.5 && r < 0.42
+        });
+        for (options, side) in [(CUT, Side::Object), (FILL, Side::Background)] {
+            let edited = EditedOctree::unedited(signed.clone());
+            let t = std::time::Instant::now();
+            let mut complex = Complex::new(&edited, side);
+            let t1 = t.elapsed();
+            let thinned = thin(&mut complex, None, &Silent).unwrap();
+            let t2 = t.elapsed();
+            let skeleton = Skeleton::new(&complex);
+            let t3 = t.elapsed();
+            let l = span::loops(&edited, &complex, &skeleton, &Silent).unwrap();
+            println!("{depth} {side:?} bricks {} {} complex {t1:?} thin {:?} {thinned:?} skeleton {:?} edges {} arcs {} loops {:?} {} bytes {}", signed.crossings().bricks().len(), complex.bricks(), t2-t1, t3-t2, skeleton.edges().len(), skeleton.arcs().len(), t.elapsed()-t3, l.len(), complex.bytes());
+            let t = std::time::Instant::now();
+            let (_, report) = mend(&signed, &options);
+            let area: Vec<f64> = report.cuts.iter().chain(&report.fills).map(|h| h.area).collect();
+            println!("{depth} {:?} {:?} {} {:?} {:?}", report.before, report.after, area.len(), area.iter().copied().fold(0.0, f64::max), t.elapsed());
+        }
+    }
+}
