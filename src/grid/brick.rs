@@ -211,6 +211,26 @@ impl Plane {
         (plane, parity)
     }
 
+    /// Whether a bit is set in the layer in which `axis` is 0.
+    #[inline]
+    pub fn touches_min(&self, axis: Axis) -> bool {
+        match axis {
+            Axis::X => self.touches_min_x(),
+            Axis::Y => self.touches_min_y(),
+            Axis::Z => self.touches_min_z(),
+        }
+    }
+
+    /// Whether a bit is set in the layer in which `axis` is 7.
+    #[inline]
+    pub fn touches_max(&self, axis: Axis) -> bool {
+        match axis {
+            Axis::X => self.0[7] != 0,
+            Axis::Y => self.any(Y0 << 56),
+            Axis::Z => self.any(Z0 << 7),
+        }
+    }
+
     /// Whether a bit with x = 0 is set.
     pub fn touches_min_x(&self) -> bool {
         self.0[0] != 0
@@ -380,6 +400,8 @@ mod tests {
                 let high = Plane::from_low_layer(axis, plane.high_layer(axis));
                 prop_assert_eq!(high, Plane::EMPTY.at_minus(axis, &plane));
                 let low = Plane::from_low_layer(axis, plane.low_layer(axis));
+                prop_assert_eq!(plane.touches_min(axis), !low.is_empty());
+                prop_assert_eq!(plane.touches_max(axis), !high.is_empty());
                 prop_assert_eq!(low, plane_from(|c| c[axis.index()] == 0 && plane.get(Local::new(c[0], c[1], c[2]))));
             }
             prop_assert_eq!(plane.turned_over(), plane_from(|[x, y, z]| plane.get(Local::new(7 - x, 7 - y, 7 - z))));

@@ -32,6 +32,7 @@
 //! something was removed there.
 
 use crate::grid::brick::{Local, Plane};
+use crate::grid::key::SIDE;
 use crate::grid::{Axis, Extent, Face, Key};
 use crate::octree::crossings::{finest_element, lattice_point, owner};
 use crate::octree::{EditedOctree, LinearOctree};
@@ -114,6 +115,14 @@ pub(super) struct Spot {
     pub(super) brick: u32,
     pub(super) extent: Extent,
     pub(super) local: Local,
+}
+
+impl Spot {
+    /// All of it in one word.
+    #[inline]
+    pub(super) fn pack(self) -> u64 {
+        u64::from(self.brick) << 12 | u64::from(self.extent.bits()) << 9 | u64::from(self.local.index())
+    }
 }
 
 impl Complex {
@@ -211,6 +220,12 @@ impl Complex {
         self.bricks.len()
     }
 
+    /// Number of live elements in listed bricks.
+    pub fn count(&self) -> u64 {
+        let of = |brick: &Brick| brick.live.as_deref().map_or(0, |planes| planes.iter().map(Plane::count).sum::<u32>());
+        self.bricks.par_iter().map(|brick| u64::from(of(brick))).sum()
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let boxes: usize = self
@@ -288,6 +303,18 @@ impl Complex {
         };
         let [origin, at] = [lattice_point(self.depth, self.bricks[spot.brick as usize].key), local.coords()];
         finest_element(self.depth, std::array::from_fn(|a| origin[a] + at[a]), extent)
+    }
+
+    /// The centre of the element at a spot, in lattice units.
+    pub(super) fn coordinates(&self, spot: Spot) -> [f64; 3] {
+        let size = f64::from(SIDE >> self.depth);
+        let origin = lattice_point(self.depth, self.bricks[spot.brick as usize].key);
+        let local = spot.local.coords();
+        std::array::from_fn(|a| {
+            let half = if spot.extent.contains(Axis::ALL[a]) { 0.5 } else { 0.0 };
+            let own = f64::from(local[a]) + half;
+            (f64::from(origin[a]) + if self.side == Side::Object { own } else { 7.5 - own }) * size
+        })
     }
 
     /// Where the element with this name is, if its brick is listed.

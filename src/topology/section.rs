@@ -17,13 +17,14 @@
 //!
 //! Cost: some 200 ns an edge of the section.
 
-use super::complex::{Brick, Complex, DEEP, NOTHING, Side, Spot};
+use super::complex::{Brick, Complex, DEEP, NOTHING, Record, Side, Spot};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Corner, Edge, Extent, Face};
 use crate::octree::EditedOctree;
 use ahash::RandomState;
 use hashbrown::HashMap;
 use rayon::prelude::*;
+use std::hash::BuildHasher;
 
 /// The cross-section at an edge of the skeleton.
 #[derive(Debug, Clone)]
@@ -36,30 +37,54 @@ pub(super) struct Section {
     pub(super) centre: [f64; 3],
 }
 
-impl Section {
-    /// The section through an edge that no face is left at; `signs` are those of the complex.
-    pub(super) fn of(signs: &Signs, complex: &Complex, edge: Spot) -> Section {
-        let flow = Flow::into(complex, edge);
-        let phi = flow.phi();
-        let rim = Rim { signs, complex };
+/// Takes sections of one complex; reuses its memory.
+pub(super) struct Sections<'a> {
+    rim: Rim<'a>,
+    flow: Flow,
+}
+
+impl<'a> Sections<'a> {
+    /// `signs` are those of the complex.
+    pub(super) fn new(complex: &'a Complex, signs: &'a Signs) -> Self {
+        Sections { rim: Rim { signs, complex }, flow: Flow::default() }
+    }
+
+    /// The section through an edge that no face is left at.
+    pub(super) fn at(&mut self, edge: Spot) -> Section {
+        let complex = self.rim.complex;
+        self.flow.follow(complex, edge);
         let mut vector = [0.0; 3];
         let mut centre = [0.0; 3];
-        for (&spot, &phi) in flow.edges.iter().zip(&phi) {
-            let square = rim.square(spot);
-            let at = complex.key(spot).center();
+        for (&spot, &phi) in self.flow.edges.iter().zip(&self.flow.phi) {
+            let square = self.rim.square(spot);
+            let at = complex.coordinates(spot);
             for a in 0..3 {
                 vector[a] += phi as f64 * square[a];
-                centre[a] += f64::from(at[a]);
+                centre[a] += at[a];
             }
         }
-        let squares = flow.edges.len() as u64;
+        let squares = self.flow.edges.len() as u64;
         Section {
             area: vector.iter().map(|c| c * c).sum::<f64>().sqrt(),
             squares,
             centre: centre.map(|c| c / squares as f64),
         }
     }
+
+    /// A guess at the area of the section, in no time: the two shorter ones of the three lines along the axes through the start of an
+    /// edge, as far as they stay on the complex's side.
+    pub(super) fn guess(&self, edge: Spot) -> u32 {
+        let length = |axis| {
+            [false, true].map(|high| self.rim.signs.run(self.rim.complex, edge, Face::new(axis, high))).iter().sum::<u32>()
+        };
+        let mut lengths = Axis::ALL.map(|axis| length(axis) + 1);
+        lengths.sort_unstable();
+        lengths[0] * lengths[1]
+    }
 }
+
+/// The length from which on lines are all the same, in cells.
+const FAR: u32 = 64;
 
 /// The signs of a complex's points of the grid, by brick, in the complex's own coordinates.
 pub(super) struct Signs(Vec<Plane>);
@@ -77,6 +102,31 @@ impl Signs {
             if complex.side() == Side::Object { plane } else { plane.turned_over() }
         };
         Signs(complex.bricks.par_iter().map(of).collect())
+    }
+
+    /// How many steps it is from the start of a spot to the last point on the complex's side in one direction; not more than [`FAR`].
+    fn run(&self, complex: &Complex, spot: Spot, toward: Face) -> u32 {
+        let mut steps = 0;
+        let axis = toward.axis();
+        let mut brick = spot.brick;
+        let mut at = spot.local.coords();
+        while steps < FAR {
+            let c = &mut at[axis.index()];
+            let next = if toward.is_high() { *c + 1 } else { c.wrapping_sub(1) };
+            if next > 7 {
+                brick = complex.beside(brick, toward);
+                if brick >= DEEP {
+                    return if brick == NOTHING && complex.side() == Side::Object { steps } else { FAR };
+                }
+            }
+            *c = next & 7;
+            let inside = self.0[brick as usize].get(Local::new(at[0], at[1], at[2]));
+            if inside != (complex.side() == Side::Object) {
+                break;
+            }
+            steps += 1;
+        }
+        steps
     }
 
     /// The sign of a point, some steps of -1, 0 or 1 from the start of a brick's position.
@@ -132,8 +182,9 @@ impl Rim<'_> {
     /// How far the corner in a cell of the complex's coordinates is moved.
     fn moved(&self, cell: Spot) -> [f64; 3] {
         let complex = self.complex;
-        let record = complex.bricks[cell.brick as usize].record.as_deref();
-        if complex.get(cell) || record.is_some_and(|record| record.face_of(cell.local).is_some()) {
+        let brick = &complex.bricks[cell.brick as usize];
+        let is_removed = |record: &Record| (record.cells[0] | record.cells[1]).get(cell.local);
+        if brick.record.as_deref().is_some_and(is_removed) || complex.get(cell) {
             return [0.0; 3];
         }
         let sign = |steps| self.signs.at(complex, cell.brick, cell.local, steps);
@@ -166,62 +217,88 @@ impl Rim<'_> {
 }
 
 /// The edges that flowed into one, and how.
+#[derive(Default)]
 struct Flow {
     edges: Vec<Spot>,
+    /// The cocycle, edge by edge.
+    phi: Vec<i64>,
     /// From, to (places in the list), and how the sign changes: phi(to) gets that times phi(from).
     steps: Vec<(u32, u32, i64)>,
+    /// By edge, the first step that starts there, and one more at the end.
+    first: Vec<u32>,
+    /// By edge, how many steps to it are still to be taken.
+    waiting: Vec<u32>,
+    ready: Vec<u32>,
+    places: Places,
+}
+
+/// The place of an edge in a list, by its packed spot.
+type Places = HashMap<u64, u32, Hasher>;
+
+/// Seeds for [`Places`], which never differ.
+#[derive(Clone)]
+struct Hasher(RandomState);
+
+impl Default for Hasher {
+    fn default() -> Self {
+        Hasher(RandomState::with_seeds(1, 2, 3, 4))
+    }
+}
+
+impl BuildHasher for Hasher {
+    type Hasher = <RandomState as BuildHasher>::Hasher;
+    fn build_hasher(&self) -> Self::Hasher {
+        self.0.build_hasher()
+    }
 }
 
 impl Flow {
-    fn into(complex: &Complex, edge: Spot) -> Flow {
-        let mut flow = Flow { edges: vec![edge], steps: Vec::new() };
-        let mut places: HashMap<Spot, u32, RandomState> = HashMap::with_hasher(RandomState::with_seeds(1, 2, 3, 4));
-        places.insert(edge, 0);
+    /// Finds all edges that flowed into one, and phi.
+    fn follow(&mut self, complex: &Complex, edge: Spot) {
+        self.edges.clear();
+        self.steps.clear();
+        self.first.clear();
+        self.waiting.clear();
+        self.places.clear();
+        self.edges.push(edge);
+        self.waiting.push(0);
+        self.places.insert(edge.pack(), 0);
         let mut next = 0;
-        while next < flow.edges.len() {
-            let (from, place) = (flow.edges[next], next as u32);
-            next += 1;
+        while let Some(&from) = self.edges.get(next) {
+            self.first.push(self.steps.len() as u32);
             for (side, face) in faces_around(complex, from) {
                 let Some((partner, edge)) = partner(complex, face) else { continue };
                 if edge == from {
                     continue;
                 }
-                let to = *places.entry(edge).or_insert_with(|| {
-                    flow.edges.push(edge);
-                    flow.edges.len() as u32 - 1
+                let to = *self.places.entry(edge.pack()).or_insert_with(|| {
+                    self.edges.push(edge);
+                    self.waiting.push(0);
+                    self.edges.len() as u32 - 1
                 });
+                self.waiting[to as usize] += 1;
                 // The edge is on the side of the face that is opposite to where the face is seen from the edge.
                 let sign = -incidence(face.extent, side.opposite()) * incidence(face.extent, partner);
-                flow.steps.push((place, to, sign));
+                self.steps.push((next as u32, to, sign));
             }
+            next += 1;
         }
-        flow
-    }
-
-    /// The cocycle, edge by edge: each one as soon as all that it flows into is known.
-    fn phi(&self) -> Vec<i64> {
-        let n = self.edges.len();
-        let mut waiting = vec![0u32; n];
-        let mut first = vec![0u32; n + 1];
-        for &(from, to, _) in &self.steps {
-            waiting[to as usize] += 1;
-            first[from as usize + 1] += 1;
-        }
-        (0..n).for_each(|i| first[i + 1] += first[i]);
-        let mut phi = vec![0i64; n];
-        phi[0] = 1;
-        // Steps come in the order of where they start.
-        let mut ready = vec![0u32];
-        while let Some(from) = ready.pop() {
-            for &(_, to, sign) in &self.steps[first[from as usize] as usize..first[from as usize + 1] as usize] {
-                phi[to as usize] += sign * phi[from as usize];
-                waiting[to as usize] -= 1;
-                if waiting[to as usize] == 0 {
-                    ready.push(to);
+        self.first.push(self.steps.len() as u32);
+        // Each edge as soon as all that it flows into is known.
+        self.phi.clear();
+        self.phi.resize(self.edges.len(), 0);
+        self.phi[0] = 1;
+        self.ready.push(0);
+        while let Some(from) = self.ready.pop() {
+            let steps = self.first[from as usize] as usize..self.first[from as usize + 1] as usize;
+            for &(_, to, sign) in &self.steps[steps] {
+                self.phi[to as usize] += sign * self.phi[from as usize];
+                self.waiting[to as usize] -= 1;
+                if self.waiting[to as usize] == 0 {
+                    self.ready.push(to);
                 }
             }
         }
-        phi
     }
 }
 

@@ -41,7 +41,7 @@ use rayon::prelude::*;
 pub struct Thinned {
     /// Steps until nothing was left to collapse.
     pub steps: u32,
-    /// Elements removed.
+    /// Elements removed; of a background, a few at its box too many.
     pub removed: u64,
 }
 
@@ -83,6 +83,8 @@ const GRAIN: usize = 64;
 /// `Cancelled`.
 pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress) -> Result<Thinned> {
     let mut done = Thinned::default();
+    let before = complex.count();
+    let listed = complex.bricks.len();
     let mut active = first_front(complex);
     let mut place_of = Vec::new();
     loop {
@@ -92,13 +94,16 @@ pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress)
         let mut marks: Vec<Marks> =
             active.par_iter().with_min_len(GRAIN).filter_map(|&brick| Marks::of(complex, brick, erode)).collect();
         if marks.is_empty() {
+            // Bricks that were opened were full.
+            let opened = complex.bricks.len() - listed;
+            done.removed = (before + opened as u64 * 4096).saturating_sub(complex.count());
             return Ok(done);
         }
         // Faces whose turn has not come yet are waited for.
         let waiting: Vec<u32> = marks.iter().filter(|marks| marks.waiting).map(|marks| marks.brick).collect();
         marks.retain(|marks| marks.kinds != 0);
         let step = Step::new(complex, &marks, &mut place_of);
-        done.removed += step.run(complex, &mut active);
+        step.run(complex, &mut active);
         active.extend(waiting);
         active.sort_unstable();
         active.dedup();
@@ -115,7 +120,7 @@ fn first_front(complex: &mut Complex) -> Vec<u32> {
         for axis in Axis::ALL {
             let high = Face::new(axis, true);
             let misses = |&(extent, other): &(Extent, Axis)| {
-                other == axis && (!complex.live(brick)[(extent | axis).index()]).high_layer(axis) != 0
+                other == axis && (!complex.live(brick)[(extent | axis).index()]).touches_max(axis)
             };
             if complex.beside(brick, high) == DEEP && PAIRS.iter().any(misses) {
                 front.extend(complex.open(brick, high));
@@ -199,7 +204,7 @@ impl<'a> Step<'a> {
                 let touches = |&&(extent, other): &&(Extent, Axis)| {
                     other == axis
                         && mark.kinds >> extent.index() & 1 == 1
-                        && mark.planes[extent.index()].low_layer(axis) != 0
+                        && mark.planes[extent.index()].touches_min(axis)
                 };
                 if PAIRS.iter().find(touches).is_some() {
                     uppers.extend(complex.open(mark.brick, Face::new(axis, false)));
@@ -221,8 +226,8 @@ impl<'a> Step<'a> {
         Step { marks, place_of, work }
     }
 
-    /// Takes all pairs away; `active` becomes the bricks to look at in the next step. Returns the number of elements removed.
-    fn run(mut self, complex: &mut Complex, active: &mut Vec<u32>) -> u64 {
+    /// Takes all pairs away; `active` becomes the bricks to look at in the next step.
+    fn run(mut self, complex: &mut Complex, active: &mut Vec<u32>) {
         let marks_of = |brick: u32| {
             let place = if brick < DEEP { self.place_of[brick as usize] } else { NO_MARKS };
             (place != NO_MARKS).then(|| &self.marks[place as usize])
@@ -236,7 +241,7 @@ impl<'a> Step<'a> {
         let carries: Vec<[u64; 12]> = self.work.iter().map(|work| work.carries).collect();
         (0..).zip(&self.work).for_each(|(i, work)| self.place_of[work.place as usize] = i);
         let place_of = &*self.place_of;
-        let changes: Vec<(u32, u8)> = self
+        let changes: Vec<u8> = self
             .work
             .par_iter_mut()
             .with_min_len(GRAIN)
@@ -258,20 +263,14 @@ impl<'a> Step<'a> {
             let brick = &mut complex.bricks[work.place as usize];
             (brick.live, brick.record) = (live.filter(|planes| planes.iter().any(|p| !p.is_empty())), record);
         }
-        let mut removed = 0;
-        for (place, (count, touches)) in places.into_iter().zip(changes) {
-            if count == 0 {
-                continue;
-            }
-            removed += u64::from(count);
+        for (place, change) in places.into_iter().zip(changes).filter(|(_, change)| *change != 0) {
             active.push(place);
             for axis in Axis::ALL {
-                if touches >> axis.index() & 1 == 1 {
+                if change >> axis.index() & 1 == 1 {
                     active.extend(complex.open(place, Face::new(axis, true)));
                 }
             }
         }
-        removed
     }
 }
 
@@ -290,12 +289,16 @@ impl Work {
             let (lower, upper) = (extent.index(), (extent | axis).index());
             let marked = plane(own, extent);
             let low = marked & live[upper];
-            live[lower] &= !low;
-            live[upper] &= !low;
+            if !low.is_empty() {
+                live[lower] &= !low;
+                live[upper] &= !low;
+            }
             let high = marked.at_plus(axis, &plane(next, extent)) & live[upper];
-            live[lower] &= !high.at_minus(axis, &Plane::EMPTY);
-            live[upper] &= !high;
-            *carry = high.high_layer(axis);
+            if !high.is_empty() {
+                live[lower] &= !high.at_minus(axis, &Plane::EMPTY);
+                live[upper] &= !high;
+                *carry = high.high_layer(axis);
+            }
             if extent.dimension() > 0 {
                 let record = self.brick.record.get_or_insert_with(|| Box::new(Record::NONE));
                 record.note(extent, axis, low, high);
@@ -303,25 +306,24 @@ impl Work {
         }
     }
 
-    /// Takes away what the low neighbours chose here. How many elements the brick has lost, and for each axis (a bit) whether one of
-    /// them lies in the high layer and extends along it.
-    fn finish(&mut self, carried: [Option<&[u64; 12]>; 3]) -> (u32, u8) {
-        let Some(live) = self.brick.live.as_deref_mut() else { return (0, 0) };
+    /// Takes away what the low neighbours chose here. Whether the brick has lost anything (bit 3), and for each axis (bits 0 to 2) whether
+    /// something of that lies in the high layer and extends along it.
+    fn finish(&mut self, carried: [Option<&[u64; 12]>; 3]) -> u8 {
+        let Some(live) = self.brick.live.as_deref_mut() else { return 0 };
         for (i, (extent, axis)) in PAIRS.into_iter().enumerate() {
             let layer = carried[axis.index()].map_or(0, |carries| carries[i]);
             if layer != 0 {
                 live[extent.index()] &= !Plane::from_low_layer(axis, layer);
             }
         }
-        let (mut count, mut touches) = (0, 0);
-        for extent in Extent::ALL {
-            let lost = live[extent.index()] ^ self.before[extent.index()];
-            count += lost.count();
-            for axis in extent.axes() {
-                touches |= u8::from(lost.high_layer(axis) != 0) << axis.index();
-            }
-        }
-        (count, touches)
+        let lost: Planes = std::array::from_fn(|extent| live[extent] ^ self.before[extent]);
+        let along = Axis::ALL.map(|axis| {
+            let with = Extent::ALL.into_iter().filter(|extent| extent.contains(axis));
+            with.fold(Plane::EMPTY, |all, extent| all | lost[extent.index()])
+        });
+        let touches = Axis::ALL.map(|axis| u8::from(along[axis.index()].touches_max(axis)) << axis.index());
+        let lost = along.iter().fold(lost[0], |all, plane| all | *plane);
+        touches.iter().fold(u8::from(!lost.is_empty()) << 3, |all, bit| all | bit)
     }
 }
 
