@@ -50,6 +50,7 @@
 //! | [`mesh`] | [`Mesh`], reports and validation, sources and sinks of meshes that pass by, broken samples to try |
 //! | [`io`] | STL, PLY, OBJ and OFF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
+//! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
 //! | [`grid`] | keys, axes, corners, bricks of bits, the 256 cases: integers only |

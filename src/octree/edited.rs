@@ -16,9 +16,10 @@
 //! planes of a whole brick ([`EditedOctree::elements`]).
 
 use super::SignedOctree;
-use super::crossings::{finest_element, owner};
+use super::crossings::{finest_element, lattice_point, owner};
 use crate::grid::brick::Plane;
-use crate::grid::{Extent, Key};
+use crate::grid::key::SIDE;
+use crate::grid::{Corner, Extent, Key};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -50,7 +51,11 @@ impl EditedOctree {
     #[must_use]
     pub fn with(self, elements: Vec<Key>, add: bool) -> Self {
         let EditedOctree { signed, mut removed, mut added } = self;
-        if add { added.extend(elements) } else { removed.extend(elements) }
+        if add {
+            added.extend(elements);
+        } else {
+            removed.extend(elements);
+        }
         EditedOctree::new(signed, removed, added)
     }
 
@@ -92,7 +97,7 @@ impl EditedOctree {
 
     /// Whether all corners of an element are inside by their signs.
     fn all_inside(&self, element: Key) -> bool {
-        let side = crate::grid::key::SIDE >> self.signed.crossings().depth();
+        let side = SIDE >> self.signed.crossings().depth();
         element.points().all(|p| self.signed.is_inside(p.center().map(|c| c / side)))
     }
 
@@ -119,7 +124,7 @@ impl EditedOctree {
 
     /// Whether a brick that the crossings do not list lies inside.
     pub fn is_uniformly_inside(&self, brick: Key) -> bool {
-        self.signed.is_inside(super::crossings::lattice_point(self.signed.crossings().depth(), brick))
+        self.signed.is_inside(lattice_point(self.signed.crossings().depth(), brick))
     }
 
     /// The bricks that own an edited element, sorted.
@@ -179,7 +184,7 @@ impl EditedOctree {
                 return Err(format!("the list of what is {name} is not sorted"));
             }
             for &element in list {
-                if finest_element(depth, super::crossings::lattice_point(depth, element), element.dir()) != element {
+                if finest_element(depth, lattice_point(depth, element), element.dir()) != element {
                     return Err(format!("{element} is {name}, but is not of the finest level"));
                 }
                 if self.all_inside(element) != (name == "removed") {
@@ -204,7 +209,7 @@ impl EditedOctree {
 /// The places in a sorted list of the finest elements that a brick owns: centres lie in it, or on its low faces.
 fn within(list: &[Key], brick: Key) -> Range<usize> {
     // The first and the last key of the brick along the Z-order curve have its corner bits all 0 and all 1.
-    let low = brick.corner(crate::grid::Corner::MIN).code();
+    let low = brick.corner(Corner::MIN).code();
     let span = u64::from(brick.size()).pow(3);
     let first = list.partition_point(|key| key.code() < low);
     let count = list[first..].partition_point(|key| key.code() < low + span);
@@ -212,8 +217,8 @@ fn within(list: &[Key], brick: Key) -> Range<usize> {
 }
 
 /// 1 for points and faces, -1 for edges and cells.
-fn alternating(extent: Extent) -> i64 {
-    if extent.dimension() % 2 == 0 { 1 } else { -1 }
+pub(crate) fn alternating(extent: Extent) -> i64 {
+    if extent.dimension().is_multiple_of(2) { 1 } else { -1 }
 }
 
 /// The Euler number of the elements in some planes, by extent.

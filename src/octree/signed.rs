@@ -173,7 +173,7 @@ impl SignedOctree {
         let mut planes = self.corners(i);
         for bit in [1, 2, 4] {
             for extent in (0..8).filter(|extent| extent & bit != 0) {
-                planes[extent] = planes[extent] & planes[extent ^ bit];
+                planes[extent] &= planes[extent ^ bit];
             }
         }
         planes

@@ -66,9 +66,9 @@ fn components_of_background(octree: &EditedOctree) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::Silent;
     use crate::topology::oracle::{betti, elements, noise, octree, smooth_noise};
     use crate::topology::thin::thin;
-    use crate::progress::Silent;
 
     fn check(octree: crate::octree::SignedOctree) {
         assert_eq!(octree.validate(), Ok(()));

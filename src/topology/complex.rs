@@ -162,15 +162,11 @@ impl Complex {
                 let corners = signed.corners(i);
                 std::array::from_fn(|side| {
                     let face = Face::ALL[side];
-                    let layer = |a: Axis| if a == face.axis() { 7 } else { 0 };
-                    match face.is_high() {
-                        false => corners[0].get(Local::from_index(0)),
-                        true => corners[usize::from(face.axis().bit())].get(Local::new(
-                            layer(Axis::X),
-                            layer(Axis::Y),
-                            layer(Axis::Z),
-                        )),
+                    if !face.is_high() {
+                        return corners[0].get(Local::from_index(0));
                     }
+                    let [x, y, z] = Axis::ALL.map(|axis| if axis == face.axis() { 7 } else { 0 });
+                    corners[usize::from(face.axis().bit())].get(Local::new(x, y, z))
                 })
             }
         };
@@ -228,11 +224,11 @@ impl Complex {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let boxes: usize = self
-            .bricks
-            .iter()
-            .map(|b| b.live.is_some() as usize * size_of::<Planes>() + b.record.is_some() as usize * size_of::<Record>())
-            .sum();
+        let of = |brick: &Brick| {
+            usize::from(brick.live.is_some()) * size_of::<Planes>()
+                + usize::from(brick.record.is_some()) * size_of::<Record>()
+        };
+        let boxes: usize = self.bricks.iter().map(of).sum();
         boxes + self.bricks.capacity() * size_of::<Brick>() + self.index.allocated_bytes()
     }
 
@@ -323,9 +319,7 @@ impl Complex {
         let brick = *self.index.get(brick?)?;
         Some(match self.side {
             Side::Object => Spot { brick, extent: element.dir(), local },
-            Side::Background => {
-                Spot { brick, extent: !element.dir(), local: Local::from_index(511 - local.index()) }
-            }
+            Side::Background => Spot { brick, extent: !element.dir(), local: Local::from_index(511 - local.index()) },
         })
     }
 
@@ -342,10 +336,7 @@ impl Complex {
         }
         let mut at = spot.local.coords();
         let c = &mut at[axis.index()];
-        let (across, next) = match face.is_high() {
-            true => (*c == 7, (*c + 1) & 7),
-            false => (*c == 0, c.wrapping_sub(1) & 7),
-        };
+        let (across, next) = if face.is_high() { (*c == 7, (*c + 1) & 7) } else { (*c == 0, c.wrapping_sub(1) & 7) };
         *c = next;
         let local = Local::new(at[0], at[1], at[2]);
         let brick = if across { self.beside(spot.brick, face) } else { spot.brick };

@@ -215,7 +215,9 @@ impl Union<'_> {
                 if !is_there(self.rows.entries.get(place)) {
                     self.join(node, before.map_or(SENTINEL, |i| self.rows.entries[i].gap));
                 }
-                while let Some(entry) = self.rows.entries.get(place).filter(|entry| entry.row == row && entry.x + 1 < to) {
+                while let Some(entry) =
+                    self.rows.entries.get(place).filter(|entry| entry.row == row && entry.x + 1 < to)
+                {
                     let gap = entry.gap;
                     if gap != NOTHING {
                         self.join(node, gap);

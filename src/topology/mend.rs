@@ -163,10 +163,10 @@ impl Loops {
     }
 }
 
-/// Layers of erosion after which no section of that area has a cell left: its inradius is at most that of the disc, and the front moves by at
-/// least a cell's side in every sqrt(3) layers. Two more for the grid.
+/// Steps of thinning after which no section of that area has a cell left: its inradius is at most that of the disc, and fronts move by at
+/// least 2.83 cells in five steps (see [`thin`](mod@super::thin)). One round more for the grid.
 pub fn layers(limit: f64) -> Option<u32> {
-    let layers = (limit / std::f64::consts::PI).sqrt() * 3f64.sqrt() + 2.0;
+    let layers = (limit / std::f64::consts::PI).sqrt() * 5.0 / 2.83 + 5.0;
     (layers < f64::from(1 << 20)).then(|| layers.ceil() as u32)
 }
 
@@ -204,24 +204,27 @@ pub fn repair_topology(
             octree = EditedOctree::unedited(signed);
         }
     }
+    report.after = if report.islands_dropped + report.cavities_filled > 0 { Betti::of(&octree) } else { report.before };
     let mut work = Work { octree, report, progress };
     if options.genus.is_some() || options.cheapest {
         work.cheapest(options)?;
     } else {
-        work.remove(Side::Object, options.cut, usize::MAX)?;
-        work.remove(Side::Background, options.fill, usize::MAX)?;
+        work.remove(Side::Object, options.cut)?;
+        work.remove(Side::Background, options.fill)?;
     }
     let Work { octree, mut report, .. } = work;
-    report.after = if octree.is_edited() || report.islands_dropped + report.cavities_filled > 0 {
-        Betti::of(&octree)
-    } else {
-        report.before
-    };
+    if octree.is_edited() {
+        report.after = Betti::of(&octree);
+    }
     report.removed = octree.removed().len() as u64;
     report.added = octree.added().len() as u64;
     report.changed_cells = octree.changed_cells();
     Ok((octree, report))
 }
+
+/// The area up to which loops are looked for first, where it is not known how large those are that have to go: most of what noise makes is
+/// smaller.
+const FIRST_SIZE: f64 = 8.0;
 
 struct Work<'a> {
     octree: EditedOctree,
@@ -230,13 +233,13 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Removes loops of one side up to a size, at most `most` of them. How many it were.
-    fn remove(&mut self, side: Side, size: Option<f64>, most: usize) -> Result<usize> {
-        let Some(size) = size.filter(|_| most > 0) else { return Ok(0) };
+    /// Removes all loops of one side up to a size.
+    fn remove(&mut self, side: Side, size: Option<f64>) -> Result<()> {
+        let Some(size) = size else { return Ok(()) };
         let loops = Loops::find(&self.octree, side, size, self.progress)?;
-        let count = loops.found.partition_point(|found| found.section.area <= size).min(most);
+        let count = loops.found.partition_point(|found| found.section.area <= size);
         self.apply(&loops, count);
-        Ok(count)
+        Ok(())
     }
 
     fn apply(&mut self, loops: &Loops, count: usize) {
@@ -253,35 +256,39 @@ impl Work<'_> {
         self.octree = loops.remove(octree, count);
     }
 
-    /// Cuts or fills, whichever is smaller, in rounds. Every loop of the solid goes through a tunnel; once it is cut, the tunnel is gone.
-    /// Nobody says which belongs to which, so in a round the next sizes are looked at, of handles and tunnels alike, as many as
-    /// loops have to go; what is a handle is cut, then the tunnels up to that size that are still there are filled.
+    /// Cuts or fills, whichever is smaller. Every handle goes round a tunnel, and once it is cut, the tunnel is gone; but nobody says which
+    /// belongs to which. So both are looked for anew after each of a few runs from small to large: of the side that has the smallest
+    /// loop, those that are smaller than any of the other side are removed, but not less than a quarter of what it has of this size.
+    /// Sizes rise in steps of four, and erosion with them, so that small loops do not cost a thinning of the whole volume.
     fn cheapest(&mut self, options: &Options) -> Result<()> {
-        let bound = |size: Option<f64>| size.unwrap_or(f64::INFINITY);
-        let (cut, fill) = (bound(options.cut), bound(options.fill));
-        loop {
-            let left = Betti::of(&self.octree).handles;
-            let excess = left.saturating_sub(options.genus.unwrap_or(0)) as usize;
-            if excess == 0 {
-                return Ok(());
+        let depth = self.octree.signed().crossings().depth();
+        let bounds = [options.cut, options.fill].map(|size| size.unwrap_or(f64::INFINITY));
+        let mut excess = self.report.after.handles.saturating_sub(options.genus.unwrap_or(0)) as usize;
+        let mut size = FIRST_SIZE;
+        while excess > 0 {
+            let mut sides = Vec::with_capacity(2);
+            for (side, bound) in [Side::Object, Side::Background].into_iter().zip(bounds) {
+                let loops = Loops::find(&self.octree, side, bound.min(size), self.progress)?;
+                let sizes: Vec<f64> = loops.found.iter().map(|found| found.section.area).collect();
+                let count = sizes.partition_point(|&area| area <= bound.min(size));
+                sides.push((loops, sizes[..count].to_vec()));
             }
-            let object = Loops::find(&self.octree, Side::Object, cut, self.progress)?;
-            let background = Loops::find(&self.octree, Side::Background, fill, self.progress)?;
-            let sizes = |loops: &Loops, bound: f64| -> Vec<f64> {
-                loops.found.iter().map(|found| found.section.area).filter(|&area| area <= bound).collect()
-            };
-            let (cuts, fills) = (sizes(&object, cut), sizes(&background, fill));
-            let mut all = [cuts.as_slice(), fills.as_slice()].concat();
-            all.sort_by(f64::total_cmp);
-            let Some(&largest) = all.get(excess.min(all.len()).wrapping_sub(1)) else { return Ok(()) };
-            let count = cuts.partition_point(|&area| area <= largest).min(excess);
-            drop(background);
-            self.apply(&object, count);
-            drop(object);
-            let filled = self.remove(Side::Background, Some(largest.min(fill)), excess - count)?;
-            if count + filled == 0 {
-                return Ok(());
+            let smallest = [0, 1].map(|side| sides[side].1.first().copied().unwrap_or(f64::INFINITY));
+            let side = usize::from(smallest[1] < smallest[0]);
+            let (loops, sizes) = &sides[side];
+            if sizes.is_empty() {
+                if size.is_infinite() {
+                    break;
+                }
+                // No section is wider than the root.
+                size = if size < 4f64.powi(depth as i32) { 4.0 * size } else { f64::INFINITY };
+                continue;
             }
+            let run = sizes.partition_point(|&area| area <= smallest[1 - side]);
+            let count = run.max(sizes.len().div_ceil(4)).min(excess);
+            self.apply(loops, count);
+            excess -= count;
         }
+        Ok(())
     }
 }

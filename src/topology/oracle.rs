@@ -2,7 +2,7 @@
 
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Extent, Key};
-use crate::octree::crossings::{finest_element, lattice_point};
+use crate::octree::crossings::finest_element;
 use crate::octree::{EditedOctree, SignedOctree};
 
 /// The octree of the lattice points for which `inside` says so; those with a coordinate 0 are outside.
@@ -150,9 +150,4 @@ pub(crate) fn torus(centre: [f64; 3], axis: [f64; 3], big: f64, small: f64, p: [
     let along: f64 = (0..3).map(|a| d[a] * axis[a] / length).sum();
     let across = (d.iter().map(|c| c * c).sum::<f64>() - along * along).max(0.0).sqrt();
     (across - big).hypot(along) - small
-}
-
-/// A place in lattice units as a lattice point.
-pub(crate) fn at(depth: u32, key: Key) -> [u32; 3] {
-    lattice_point(depth, key)
 }

@@ -15,6 +15,7 @@ use super::complex::{Complex, Planes, Spot};
 use super::section::partner;
 use crate::grid::{Extent, Face, Key};
 use crate::octree::EditedOctree;
+use crate::octree::edited::alternating;
 
 /// The elements that go with some edges of the skeleton, in no particular order.
 ///
@@ -27,7 +28,7 @@ pub(super) fn patches(octree: &EditedOctree, complex: &Complex, edges: &[Spot]) 
         patch.spread(spot);
     }
     debug_assert_eq!(
-        patch.gone.iter().map(|spot| if spot.extent.dimension() % 2 == 0 { 1 } else { -1 }).sum::<i64>(),
+        patch.gone.iter().map(|spot| alternating(spot.extent)).sum::<i64>(),
         -(edges.len() as i64),
         "pairs go as a whole"
     );
@@ -66,10 +67,10 @@ impl Patch<'_> {
             }
             return;
         }
-        if spot.extent.dimension() == 2 {
-            if let Some((_, edge)) = partner(complex, spot) {
-                self.add(edge);
-            }
+        if spot.extent.dimension() == 2
+            && let Some((_, edge)) = partner(complex, spot)
+        {
+            self.add(edge);
         }
         for side in Face::ALL.into_iter().filter(|side| !spot.extent.contains(side.axis())) {
             if let Some(coface) = complex.half_toward(spot, side) {

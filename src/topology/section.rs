@@ -75,7 +75,10 @@ impl<'a> Sections<'a> {
     /// edge, as far as they stay on the complex's side.
     pub(super) fn guess(&self, edge: Spot) -> u32 {
         let length = |axis| {
-            [false, true].map(|high| self.rim.signs.run(self.rim.complex, edge, Face::new(axis, high))).iter().sum::<u32>()
+            [false, true]
+                .map(|high| self.rim.signs.run(self.rim.complex, edge, Face::new(axis, high)))
+                .iter()
+                .sum::<u32>()
         };
         let mut lengths = Axis::ALL.map(|axis| length(axis) + 1);
         lengths.sort_unstable();

@@ -194,4 +194,3 @@ impl Graph {
         (order, arcs)
     }
 }
-

@@ -29,7 +29,7 @@
 //!
 //! Some 0.4 us a brick and step; a front needs 8 to 14 steps to cross a brick: 1 to 1.5 ns an element.
 
-use super::complex::{Brick, Complex, DEEP, NOTHING, Planes, Record};
+use super::complex::{Brick, Complex, DEEP, Planes, Record};
 use crate::error::Result;
 use crate::grid::brick::Plane;
 use crate::grid::{Axis, Extent, Face};
@@ -64,11 +64,10 @@ const PAIRS: [(Extent, Axis); 12] = {
 };
 
 /// The axes along which cells may be eroded, step by step: twice all of them, then one after the other. The first moves a front with
-/// normal n by max |n_i| (the ball of the L1 metric), the second by the sum of |n_i| (that of the maximum metric); two to one, a front
+/// normal n by max `|n_i|` (the ball of the L1 metric), the second by the sum of `|n_i|` (that of the maximum metric); two to one, a front
 /// moves by 3, 2.83 and 2.89 cells in five steps along the axes and their two kinds of diagonals. So fronts meet where Euclidean ones
 /// would, to a few percent, and cross-sections stand straight.
-const ERODED: [Extent; 5] =
-    [Extent::CELL, Extent::CELL, axis_alone(Axis::X), axis_alone(Axis::Y), axis_alone(Axis::Z)];
+const ERODED: [Extent; 5] = [Extent::CELL, Extent::CELL, axis_alone(Axis::X), axis_alone(Axis::Y), axis_alone(Axis::Z)];
 
 const fn axis_alone(axis: Axis) -> Extent {
     Extent::POINT.with(axis)
@@ -198,7 +197,7 @@ struct Step<'a> {
 impl<'a> Step<'a> {
     fn new(complex: &mut Complex, marks: &'a [Marks], place_of: &'a mut Vec<u32>) -> Self {
         let mut uppers: Vec<u32> = Vec::with_capacity(marks.len() + marks.len() / 2);
-        for mark in marks.iter() {
+        for mark in marks {
             uppers.push(mark.brick);
             for axis in Axis::ALL {
                 let touches = |&&(extent, other): &&(Extent, Axis)| {
@@ -350,4 +349,3 @@ impl Record {
         }
     }
 }
-const _: () = assert!(NOTHING > DEEP, "places below DEEP are bricks");

@@ -89,11 +89,8 @@ pub fn move_small(signed: SignedOctree, side: Side, volume: f64) -> (SignedOctre
             let edges = brick.crossed[axis.index()] & (*here | here.at_plus(axis, &next));
             toggles.extend(edges.iter().map(|local| {
                 let c = local.coords();
-                let edge = finest_element(
-                    crossings.depth(),
-                    std::array::from_fn(|a| origin[a] + c[a]),
-                    Extent::from(axis),
-                );
+                let edge =
+                    finest_element(crossings.depth(), std::array::from_fn(|a| origin[a] + c[a]), Extent::from(axis));
                 Toggle { edge, sample: Sample::new(1 << 15, 0) }
             }));
         }
