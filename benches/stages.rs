@@ -71,7 +71,7 @@ fn stages(c: &mut Criterion) {
             group.bench_function(name, |b| {
                 b.iter(|| {
                     let mut sum = Sum::default();
-                    let options = DualOptions { placement, triangles: false };
+                    let options = DualOptions { placement, ..DualOptions::default() };
                     dual_contouring(black_box(&octree), &frame, &options, &mut sum, &Silent).unwrap();
                     sum.1
                 });

@@ -102,7 +102,7 @@ pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
 pub use glam;
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Faces, Options, RepairReport, Repaired, Surface, repair, repair_into};
+pub use repair::{Faces, Inside, Options, RepairReport, Repaired, Solid, Surface, repair, repair_into, solidify};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

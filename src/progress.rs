@@ -46,6 +46,15 @@ pub trait Progress: Sync {
     fn advance(&self, amount: u64) {
         let _ = amount;
     }
+    /// A stage is going to hold so many bytes in all: the octree and what the stage needs beside it, but not source and sink. Called
+    /// before memory is taken, often while it grows.
+    ///
+    /// # Errors
+    /// When that is too much, [`Error::Memory`]; the running stage returns it.
+    fn hold(&self, bytes: u64) -> Result<()> {
+        let _ = bytes;
+        Ok(())
+    }
     /// Asked often; `true` makes the running stage return [`Error::Cancelled`].
     fn is_cancelled(&self) -> bool {
         false

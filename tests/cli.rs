@@ -381,6 +381,63 @@ fn pictures_are_drawn() {
 }
 
 #[test]
+fn grids_are_given_by_cells_and_boxes() {
+    let folder = Folder::new();
+    folder.add("cube.off", "cube");
+    let json = folder.run("repair cube.off a.ply --cell 0.03 --json").ok().json();
+    assert_eq!((&json["grid"]["cell_size"], &json["grid"]["cells_a_side"]), (&0.03.into(), &64.into()));
+    assert_eq!((&json["options"]["cell"], &json["options"]["depth"]), (&0.03.into(), &6.into()));
+    folder.run("repair cube.off b.ply --box -5 -5.5 -1e1 20 -d 5").ok().says(&["32 cells", "0.625 wide"]);
+    assert_solid(&folder.path("b.ply"));
+    // The same grid for two models: the same lattice planes.
+    let json = folder.run("repair cube.off c.ply --force --box -5 -5 -5 10 --cell 0.3 --json").ok().json();
+    assert_eq!(
+        (&json["grid"]["size"], &json["grid"]["origin"]),
+        (&19.2.into(), &serde_json::json!([-5.0, -5.0, -5.0]))
+    );
+    assert_eq!(json["options"]["box"]["size"], 10.0);
+    folder.run("repair cube.off d.ply --box 0.5 -5 -5 10").fails(&["box: the model", "least x", "holds it"]);
+    folder.run("repair cube.off d.ply --cell 1e-9").fails(&["cell: ", "262144", "take cells of"]);
+    for bad in
+        ["--cell 1 --depth 8", "--box 0 0 0 9 --scale 0.5", "--cell 0", "--cell -1", "--box 0 0 0", "--max-memory 0"]
+    {
+        folder.run(&format!("repair cube.off d.ply {bad}")).refused(&[bad.split_once(' ').unwrap().0]);
+    }
+    assert!(!folder.path("d.ply").exists());
+}
+
+#[test]
+fn flags_without_effect_are_told() {
+    let folder = Folder::new();
+    for (args, words) in [
+        ("a.obj --ascii", "--ascii makes no difference"),
+        ("a.stl --faces polygons -s dc", "STL has nothing but triangles"),
+        ("a.ply --faces polygons", "marching cubes makes triangles"),
+    ] {
+        let ran = folder.run(&format!("repair knot.ply {args} -d 5")).ok();
+        assert!(ran.err.contains(words), "{ran:?}");
+    }
+    let ran = folder.run("repair knot.ply b.ply --ascii --faces polygons -s quads -d 5").ok();
+    assert!(!ran.err.contains("no difference"), "{ran:?}");
+}
+
+/// Volumes beyond the range of numbers were NaN, and the file no solid although nothing was wrong with it.
+#[test]
+fn huge_coordinates_do_not_contradict_themselves() {
+    let folder = Folder::new();
+    let corners = "0 0 0\n1e200 0 0\n0 1e200 0\n0 0 1e200";
+    let simplex = format!("OFF\n4 4 0\n{corners}\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+    fs::write(folder.path("huge.off"), &simplex).unwrap();
+    let ran = folder.run("repair huge.off a.ply -d 5").ok();
+    assert!(ran.err.is_empty() && ran.out.ends_with("a solid\n"), "{ran:?}");
+    folder.run("info huge.off").ok().says(&["to 1.41421e200 long", "a solid"]);
+    fs::write(folder.path("huge.off"), simplex.replace("1e200", "1e305")).unwrap();
+    let ran = folder.run("repair huge.off b.ply -d 5");
+    assert!(ran.err.len() < 200, "{ran:?}");
+    ran.fails(&["box: a cube of 1.11111e305 units", "scale the model"]);
+}
+
+#[test]
 fn help_has_examples() {
     let folder = Folder::new();
     for command in ["repair", "info", "sample", "render"] {

@@ -5,7 +5,7 @@ mod common;
 use common::distance::hausdorff;
 use common::shapes::{boxed, soup, triangle, unit_cube};
 use common::{
-    Chance, SURFACES, Topology, check, check_repaired, data, mend, options, own_check, together, volume, with_faces,
+    Chance, Topology, check, check_repaired, data, mend, options, own_check, surfaces, together, volume, with_faces,
     with_points,
 };
 use glam::{DMat3, DQuat, DVec3, EulerRot};
@@ -13,11 +13,11 @@ use zmend::io::{self, Format, Precision, WriteOptions};
 use zmend::mesh::sample;
 use zmend::progress::Silent;
 use zmend::repair::Warning;
-use zmend::{Faces, Mesh, Options, Repaired, Surface, repair, repair_into};
+use zmend::{Faces, Inside, Mesh, Options, Repaired, Surface, repair, repair_into};
 
 const DC: Surface = Surface::DualContouring;
 const MC: Surface = Surface::MarchingCubes;
-const KINDS: [Surface; 3] = [MC, DC, Surface::Quads];
+const KINDS: [Surface; 4] = [MC, DC, Surface::Quads, Surface::Blocks];
 
 fn build(name: &str) -> Mesh {
     sample::build(name, 1).expect("a sample")
@@ -25,12 +25,12 @@ fn build(name: &str) -> Mesh {
 
 /// Repairs in all modes, checks, and returns the marching cubes' result with the topology that all agree on.
 fn mended(what: &str, mesh: &Mesh, depth: u32) -> (Topology, Repaired) {
-    let mut results = SURFACES.iter().map(|&(mode, surface, faces)| {
-        let repaired = repair(mesh.clone(), &options(depth, surface, faces)).expect("repairable");
+    let mut results = surfaces(depth).into_iter().map(|(mode, options)| {
+        let repaired = repair(mesh.clone(), &options).expect("repairable");
         let topology = check_repaired(&repaired).unwrap_or_else(|e| panic!("{what}, {mode}: {e}"));
         (topology, repaired)
     });
-    let first = results.next().expect("four modes");
+    let first = results.next().expect("seven modes");
     results.for_each(|(topology, _)| assert_eq!(topology, first.0, "{what}"));
     first
 }
@@ -376,11 +376,12 @@ fn thin_slabs_stay_closed_whatever_their_angle() {
         for seed in 0..6 {
             let rotation = Chance(seed).rotation();
             let slab = with_points(&slab, |p| rotation * p);
-            for (mode, surface, faces) in SURFACES {
-                let repaired = repair(slab.clone(), &options(6, surface, faces)).expect("repairable");
+            for (mode, options) in surfaces(6) {
+                let repaired = repair(slab.clone(), &options).expect("repairable");
                 assert_eq!(repaired.mesh.validate(), Ok(()), "{mode}");
                 // Both walls of a slab in one cell share its vertex in dual surfaces: these may turn over where it is flat.
-                let least = if surface == MC { 0.0 } else { -1e-3 };
+                let is_embedded = matches!(options.surface, MC | Surface::Blocks) || options.no_self_intersections;
+                let least = if is_embedded { 0.0 } else { -1e-3 };
                 assert!(volume(&repaired.mesh) >= least, "{mode}: {}", volume(&repaired.mesh));
             }
         }
@@ -392,24 +393,28 @@ fn thin_slabs_stay_closed_whatever_their_angle() {
 }
 
 #[test]
-fn order_and_orientation_of_faces_do_not_matter() {
+fn order_of_faces_does_not_matter_nor_orientation_by_parity() {
     for name in ["sphere", "part", "knot-holes", "gear", "overlap", "scan", "doubled"] {
         let mesh = build(name);
         assert!(mesh.faces.iter().all(|face| face.len() == 3), "{name} is of triangles");
         for surface in [MC, DC] {
-            let expected = mend(&mesh, 6, surface).mesh;
-            for seed in 0..2 {
+            for (seed, inside) in [(0, Inside::Auto), (1, Inside::Winding), (0, Inside::Parity), (1, Inside::Parity)] {
+                let mend = |mesh| {
+                    let options = Options { inside, ..options(6, surface, Faces::Auto) };
+                    repair(mesh, &options).expect("repairable").mesh
+                };
+                let expected = mend(mesh.clone());
                 let mut chance = Chance(seed);
                 let mut faces: Vec<Vec<u32>> = mesh.faces.iter().map(<[u32]>::to_vec).collect();
                 chance.shuffle(&mut faces);
                 for face in &mut faces {
                     face.rotate_left(chance.below(3));
-                    if chance.below(2) == 0 {
+                    if inside == Inside::Parity && chance.below(2) == 0 {
                         face.reverse();
                     }
                 }
-                let again = mend(&with_faces(&mesh, faces.iter().map(Vec::as_slice)), 6, surface).mesh;
-                assert!(again == expected, "{name} shuffled with {seed}, {surface:?}");
+                let again = mend(with_faces(&mesh, faces.iter().map(Vec::as_slice)));
+                assert!(again == expected, "{name} shuffled with {seed}, {surface:?}, {inside:?}");
             }
         }
     }

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{SURFACES, Topology, check_repaired, data, files, name, options};
+use common::{Topology, check_repaired, data, files, name, surfaces};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -38,8 +38,8 @@ fn sweep(path: &Path, depths: &[u32]) -> Outcome {
 
 fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, outcome: &mut Outcome) {
     let mut first: Option<Topology> = None;
-    for (mode, surface, faces) in SURFACES {
-        let repaired = match repair(mesh.clone(), &options(depth, surface, faces)) {
+    for (mode, options) in surfaces(depth) {
+        let repaired = match repair(mesh.clone(), &options) {
             Ok(repaired) => repaired,
             Err(error) => {
                 outcome.failures.push(format!("{name} depth {depth} {mode}: refused: {error}"));
@@ -81,7 +81,7 @@ fn every_mesh_is_repaired() {
         "sweep: {} files, {} repairs at depths {depths:?} in {} modes, {} of them empty; {} files refused; {:.1} s",
         files.len(),
         sum(|o| o.repairs),
-        SURFACES.len(),
+        surfaces(3).len(),
         sum(|o| o.empties),
         refused.len(),
         start.elapsed().as_secs_f64()
@@ -101,5 +101,5 @@ fn every_mesh_is_repaired() {
     let failures: Vec<&String> = outcomes.iter().flat_map(|o| &o.failures).collect();
     assert!(failures.is_empty(), "{} failures:\n{failures:#?}", failures.len());
     assert_eq!(refused, NOT_MESHES);
-    assert!(sum(|o| o.repairs) >= 100 * depths.len() * SURFACES.len(), "the data are all there");
+    assert!(sum(|o| o.repairs) >= 100 * depths.len() * surfaces(3).len(), "the data are all there");
 }

@@ -359,6 +359,74 @@ mod tests {
         }
     }
 
+    /// A point of the cell's surface: a corner, or a crossing that may be anywhere between the ends of its edge.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    enum Place {
+        At(Corner),
+        On(Edge),
+    }
+
+    impl Place {
+        fn end(self, high: bool) -> [i32; 3] {
+            let corner = match self {
+                Place::At(corner) => corner,
+                Place::On(edge) => edge.corners()[usize::from(high)],
+            };
+            Axis::ALL.map(|axis| i32::from(corner & axis))
+        }
+    }
+
+    /// Six times the volume of a tetrahedron.
+    fn volume(p: [[i32; 3]; 4]) -> i32 {
+        let [a, b, c] = [1, 2, 3].map(|i| [0, 1, 2].map(|k| p[i][k] - p[0][k]));
+        a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    }
+
+    /// On which side of a plane through three places a fourth one lies (1 or -1), if it is the same wherever crossings are on their
+    /// edges. The volume is linear in the place of each, so it is enough to look at their ends: but one sign there means that sign
+    /// everywhere between.
+    fn side(plane: [Place; 3], place: Place) -> Option<i32> {
+        let [a, b, c] = plane;
+        let places = [a, b, c, place];
+        let volumes = (0..16).map(|ends: u32| volume(std::array::from_fn(|i| places[i].end(ends >> i & 1 == 1))));
+        let (low, high) = volumes.fold((0, 0), |(low, high), v| (v.min(low), v.max(high)));
+        match (low < 0, high > 0) {
+            (true, false) => Some(-1),
+            (false, true) => Some(1),
+            _ => None,
+        }
+    }
+
+    /// Whether a plane through three of the corners of two triangles and of the cell has all other corners of the one strictly on one
+    /// side and those of the other on the other, wherever the crossings are: then the triangles meet in what they share, nowhere else.
+    fn are_separated(s: &[Edge; 3], t: &[Edge; 3]) -> bool {
+        let [s, t] = [s, t].map(|t| t.map(Place::On));
+        let mut places: Vec<Place> = [s, t].concat().into_iter().chain(Corner::ALL.map(Place::At)).collect();
+        places.sort();
+        places.dedup();
+        let on_side = |t: [Place; 3], plane: [Place; 3], sign: i32| {
+            t.into_iter().all(|place| plane.contains(&place) || side(plane, place) == Some(sign))
+        };
+        let separates = |plane| [1, -1].into_iter().any(|sign| on_side(s, plane, sign) && on_side(t, plane, -sign));
+        let n = places.len();
+        let mut planes = (0..n).flat_map(|i| (0..i).flat_map(move |j| (0..j).map(move |k| [i, j, k])));
+        planes.any(|plane| separates(plane.map(|i| places[i])))
+    }
+
+    /// The triangles of a cell never cross, wherever the surface crosses its edges: a proof for all 256 cases.
+    #[test]
+    fn triangles_of_a_cell_never_cross() {
+        let mut bad = Vec::new();
+        for mask in 0..=255u8 {
+            let triangles = &CASES[usize::from(mask)].triangles;
+            for (i, s) in triangles.iter().enumerate() {
+                let crossing = triangles[..i].iter().filter(|t| !are_separated(s, t));
+                bad.extend(crossing.map(|t| format!("mask {mask:#b}: {s:?} and {t:?}")));
+            }
+        }
+        assert!(bad.is_empty(), "{} {bad:#?}", bad.len());
+    }
+
     /// In the grid of element centres the solid meets each octant in a down-closed set of elements (if a face is in it, so are its
     /// edges and points). All such sets: each is connected, its complement too, so the surface crosses the octant in one disc.
     #[test]

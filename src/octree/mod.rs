@@ -20,12 +20,16 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+pub(crate) mod cells;
+pub mod compact;
 pub mod crossings;
 pub mod edited;
+pub mod hits;
 mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub mod points;
 pub mod segments;
 pub mod signed;
 mod traverse;
@@ -40,9 +44,12 @@ use hashbrown::hash_map::Entry;
 use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
+pub use compact::CompactOctree;
 pub use crossings::Crossings;
 pub use edited::EditedOctree;
+pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
+pub use points::{CellPoints, StoredPoints};
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
 pub use validate::Violation;

@@ -1,18 +1,22 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod inside;
+mod memory;
 mod options;
 mod report;
+mod solid;
 
-pub use options::{Faces, Options, Surface};
+pub use inside::{InsideChoice, Reason};
+pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
+pub use solid::Solid;
 
-use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
-use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
-use crate::sign::{close, parity_signs, scan};
+use inside::{Told, tell};
+use memory::{Guard, GuardedSink};
 use report::Clock;
 
 /// A repaired mesh and how it came about.
@@ -46,79 +50,101 @@ pub fn repair(mut mesh: Mesh, options: &Options) -> Result<Repaired> {
 
 /// Repairs whatever `source` yields and passes the result to `sink` as it is made: neither mesh need be in memory.
 ///
-/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)).
+/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)), and what the
+/// sink holds.
 ///
 /// # Errors
-/// When an option is out of range, when source or sink fail, and `Cancelled`.
+/// When an option is out of range, when the input does not fit into the given cube or needs more memory than may be taken, when source or
+/// sink fail, and `Cancelled`.
 pub fn repair_into(
     source: &mut dyn TriangleSource,
     options: &Options,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<RepairReport> {
-    let mut clock = Clock::default();
-    progress.begin(Stage::Read, 0);
-    let bounds = clock.time(Stage::Read, || source.bounds())?;
+    let begun = Begun::new(source, options, progress)?;
+    let (frame, guard) = (begun.frame, Guard::new(progress, options));
+    let report = mend(source, begun, options, &guard).and_then(|(solid, mut report)| {
+        let mut clock = Clock::default();
+        let mut guarded = GuardedSink { sink, guard: &guard };
+        report.sizes = clock.time(Stage::Contour, || solid.extract(options, &mut guarded, &guard))?;
+        report.times.append(&mut clock.times);
+        Ok(report)
+    });
+    report.map_err(|error| guard.explain(error, source, Some(sink), &frame, options))
+}
+
+/// Repairs whatever `source` yields, but extracts no surface: the solid can be written as an octree file or be extracted in several ways.
+/// The report's sizes are those of no mesh. Crossings have normals if [`Surface::needs_normals`] of the options' surface says so.
+///
+/// # Errors
+/// As [`repair_into`].
+pub fn solidify(
+    source: &mut dyn TriangleSource,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<(Solid, RepairReport)> {
+    let begun = Begun::new(source, options, progress)?;
+    let (frame, guard) = (begun.frame, Guard::new(progress, options));
+    mend(source, begun, options, &guard).map_err(|error| guard.explain(error, source, None, &frame, options))
+}
+
+/// A repair of which the extent is known.
+struct Begun {
+    bounds: Bounds,
+    frame: Frame,
+    clock: Clock,
+}
+
+impl Begun {
+    fn new(source: &mut dyn TriangleSource, options: &Options, progress: &dyn Progress) -> Result<Self> {
+        let mut clock = Clock::default();
+        progress.begin(Stage::Read, 0);
+        let bounds = clock.time(Stage::Read, || source.bounds())?;
+        Ok(Begun { bounds, frame: options.frame(&bounds)?, clock })
+    }
+}
+
+/// The stages between reading and contouring.
+fn mend(
+    source: &mut dyn TriangleSource,
+    Begun { bounds, frame, mut clock }: Begun,
+    options: &Options,
+    guard: &Guard<'_>,
+) -> Result<(Solid, RepairReport)> {
+    let progress: &dyn Progress = guard;
+    guard.check_source(source, &frame)?;
     let mut warnings = Vec::new();
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let frame = Frame::fit(&nonempty(bounds), options.depth, options.scale)?;
-    let scanned = clock.time(Stage::Scan, || scan(source, &frame, options.surface.needs_normals(), progress))?;
-    let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
-    let octree = clock.time(Stage::Sign, || {
-        progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
-    let sizes = clock.time(Stage::Contour, || extract(&octree, &frame, options, sink, progress))?;
+    let told = tell(source, &frame, options.surface.needs_normals(), options.inside, &mut clock, progress)?;
+    let Told { octree, counts, closing, choice, clipped } = told;
 
-    let counts = scanned.counts;
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
     }
     let noted = [
-        (counts.skipped_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.skipped_triangles - counts.outside_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.outside_triangles, Warning::OutsideTriangles),
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
+        (clipped, Warning::Clipped),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
-    Ok(RepairReport {
+    let report = RepairReport {
         bounds,
         frame,
         scan: counts,
         closing,
+        inside: choice,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
         volume: octree.volume() * frame.cell_size().powi(3),
-        sizes,
+        sizes: MeshSizes::default(),
         warnings,
         times: clock.times,
-    })
-}
-
-/// Extracts the surface that the options ask for.
-fn extract(
-    octree: &SignedOctree,
-    frame: &Frame,
-    options: &Options,
-    sink: &mut (dyn MeshSink + Send),
-    progress: &dyn Progress,
-) -> Result<MeshSizes> {
-    let placement = match options.surface {
-        Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
-        Surface::DualContouring => Placement::SharpFeatures,
-        Surface::Quads => Placement::MassPoint,
     };
-    let triangles = match options.faces {
-        Faces::Auto => options.surface != Surface::Quads,
-        Faces::Triangles => true,
-        Faces::Polygons => false,
-    };
-    dual_contouring(octree, frame, &DualOptions { placement, triangles }, sink, progress)
-}
-
-/// An input without faces gets the unit cube: all checks of options apply, and the result is empty.
-fn nonempty(bounds: Bounds) -> Bounds {
-    if bounds.is_empty() { Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE } } else { bounds }
+    Ok((Solid { octree, frame, points: None }, report))
 }

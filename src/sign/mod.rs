@@ -9,7 +9,8 @@ mod hits;
 mod parity;
 mod scan;
 mod walls;
+pub mod winding;
 
 pub use close::{Closing, close};
 pub use parity::parity_signs;
-pub use scan::{Scan, ScanCounts, scan};
+pub use scan::{OrientedScan, Scan, ScanCounts, expected_hits, scan, scan_oriented};

@@ -78,7 +78,7 @@ pub struct Handle {
 impl Handle {
     fn new(kind: Kind, found: &Loop) -> Self {
         let section = &found.section;
-        Handle { kind, area: section.area, squares: section.squares, centre: section.centre }
+        Handle { kind, area: section.area, squares: section.squares, centre: found.centre }
     }
 
     /// Diameter of the disc of the same area, in cells.

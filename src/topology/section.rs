@@ -33,8 +33,6 @@ pub(super) struct Section {
     pub(super) area: f64,
     /// Number of squares.
     pub(super) squares: u64,
-    /// Mean of the squares' centres, in lattice units.
-    pub(super) centre: [f64; 3],
 }
 
 /// Takes sections of one complex; reuses its memory.
@@ -54,21 +52,26 @@ impl<'a> Sections<'a> {
         let complex = self.rim.complex;
         self.flow.follow(complex, edge);
         let mut vector = [0.0; 3];
-        let mut centre = [0.0; 3];
-        for (&spot, &phi) in self.flow.edges.iter().zip(&self.flow.phi) {
+        let mut squares = 0;
+        for (&spot, &phi) in self.flow.edges.iter().zip(&self.flow.phi).filter(|(_, phi)| **phi != 0) {
             let square = self.rim.square(spot);
+            (0..3).for_each(|a| vector[a] += phi as f64 * square[a]);
+            squares += 1;
+        }
+        Section { area: vector.iter().map(|c| c * c).sum::<f64>().sqrt(), squares }
+    }
+
+    /// Mean of the centres of the squares of the section through an edge, in lattice units.
+    pub(super) fn centre(&mut self, edge: Spot) -> [f64; 3] {
+        let complex = self.rim.complex;
+        self.flow.follow(complex, edge);
+        let (mut sum, mut squares) = ([0.0; 3], 0.0);
+        for (&spot, _) in self.flow.edges.iter().zip(&self.flow.phi).filter(|(_, phi)| **phi != 0) {
             let at = complex.coordinates(spot);
-            for a in 0..3 {
-                vector[a] += phi as f64 * square[a];
-                centre[a] += at[a];
-            }
+            (0..3).for_each(|a| sum[a] += at[a]);
+            squares += 1.0;
         }
-        let squares = self.flow.edges.len() as u64;
-        Section {
-            area: vector.iter().map(|c| c * c).sum::<f64>().sqrt(),
-            squares,
-            centre: centre.map(|c| c / squares as f64),
-        }
+        sum.map(|c| c / squares)
     }
 
     /// A guess at the area of the section, in no time: the two shorter ones of the three lines along the axes through the start of an

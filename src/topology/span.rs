@@ -24,6 +24,16 @@ use std::cmp::Reverse;
 pub(super) struct Loop {
     pub(super) edge: Spot,
     pub(super) section: Section,
+    /// Mean of the section, in lattice units.
+    pub(super) centre: [f64; 3],
+}
+
+/// An edge of an arc: its place in the arc, itself and its section.
+#[derive(Debug, Clone)]
+struct Candidate {
+    place: usize,
+    edge: Spot,
+    section: Section,
 }
 
 /// The loops of a skeleton, from the thinnest on.
@@ -47,8 +57,7 @@ pub(super) fn loops(
         .collect();
     let mut arcs: Vec<(&Arc, Candidate)> = skeleton.arcs().iter().zip(thinnest?).collect();
     // Areas are not negative: their bits have their order.
-    let size = |thin: &Loop| (thin.section.area.to_bits(), thin.section.squares, thin.edge);
-    arcs.sort_by_key(|(_, (_, thin))| Reverse(size(thin)));
+    arcs.sort_by_key(|(_, thin)| Reverse((thin.section.area.to_bits(), thin.section.squares, thin.edge)));
     let mut parent: Vec<u32> = (0..skeleton.nodes().len() as u32).collect();
     let mut loops = Vec::new();
     for (arc, thin) in arcs {
@@ -65,7 +74,7 @@ pub(super) fn loops(
             |sections, (arc, thin)| refined(sections, &skeleton.spots[arc.edges.clone()], thin),
         )
         .collect();
-    loops.sort_by_key(size);
+    loops.sort_by_key(|found| (found.section.area.to_bits(), found.section.squares, found.edge));
     Ok(loops)
 }
 
@@ -78,14 +87,11 @@ fn root(parent: &mut [u32], mut a: u32) -> u32 {
     a
 }
 
-/// A section of an arc, and its edge's place in the arc.
-type Candidate = (usize, Loop);
-
 /// How many sections of an arc are taken before it is known whether it closes a loop.
 const TRIES: usize = 3;
 
 fn take(sections: &mut Sections<'_>, edges: &[Spot], i: usize) -> Candidate {
-    (i, Loop { edge: edges[i], section: sections.at(edges[i]) })
+    Candidate { place: i, edge: edges[i], section: sections.at(edges[i]) }
 }
 
 fn width(area: f64) -> usize {
@@ -97,14 +103,14 @@ fn thin_place(sections: &mut Sections<'_>, edges: &[Spot]) -> Candidate {
     let mut guesses: Vec<(u32, usize)> = edges.iter().map(|&edge| sections.guess(edge)).zip(0..).collect();
     guesses.sort_unstable();
     let mut best = take(sections, edges, guesses[0].1);
-    let mut taken = vec![best.0];
+    let mut taken = vec![best.place];
     let mut left = guesses.into_iter().skip(1);
     while taken.len() < TRIES {
-        let apart = width(best.1.section.area);
+        let apart = width(best.section.area);
         let Some((_, next)) = left.find(|(_, i)| taken.iter().all(|t| t.abs_diff(*i) >= apart)) else { break };
         let other = take(sections, edges, next);
         taken.push(next);
-        if other.1.section.area < best.1.section.area {
+        if other.section.area < best.section.area {
             best = other;
         }
     }
@@ -113,16 +119,16 @@ fn thin_place(sections: &mut Sections<'_>, edges: &[Spot]) -> Candidate {
 
 /// The thinnest section near a thin one.
 fn refined(sections: &mut Sections<'_>, edges: &[Spot], mut best: Candidate) -> Loop {
-    let mut step = width(best.1.section.area).div_ceil(2);
+    let mut step = width(best.section.area).div_ceil(2);
     while step > 0 {
-        let middle = best.0;
+        let middle = best.place;
         for i in [middle.checked_sub(step), Some(middle + step)].into_iter().flatten().filter(|&i| i < edges.len()) {
             let other = take(sections, edges, i);
-            if other.1.section.area < best.1.section.area {
+            if other.section.area < best.section.area {
                 best = other;
             }
         }
         step /= 2;
     }
-    best.1
+    Loop { edge: best.edge, centre: sections.centre(best.edge), section: best.section }
 }

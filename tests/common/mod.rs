@@ -35,13 +35,19 @@ pub(crate) fn name(path: &Path) -> String {
     format!("{}/{}", parts[1], parts[0])
 }
 
-/// The four ways to extract a surface: name, kind, and what its faces are.
-pub(crate) const SURFACES: [(&str, Surface, Faces); 4] = [
-    ("mc", Surface::MarchingCubes, Faces::Auto),
-    ("dc", Surface::DualContouring, Faces::Auto),
-    ("quads", Surface::Quads, Faces::Auto),
-    ("dc polygons", Surface::DualContouring, Faces::Polygons),
-];
+/// The ways to extract a surface, with their names; marching cubes come first.
+pub(crate) fn surfaces(depth: u32) -> [(&'static str, Options); 7] {
+    let disjoint = |options| Options { no_self_intersections: true, ..options };
+    [
+        ("mc", options(depth, Surface::MarchingCubes, Faces::Auto)),
+        ("dc", options(depth, Surface::DualContouring, Faces::Auto)),
+        ("quads", options(depth, Surface::Quads, Faces::Auto)),
+        ("dc polygons", options(depth, Surface::DualContouring, Faces::Polygons)),
+        ("blocks", options(depth, Surface::Blocks, Faces::Auto)),
+        ("dc disjoint", disjoint(options(depth, Surface::DualContouring, Faces::Auto))),
+        ("quads disjoint", disjoint(options(depth, Surface::Quads, Faces::Auto))),
+    ]
+}
 
 pub(crate) fn options(depth: u32, surface: Surface, faces: Faces) -> Options {
     Options { depth, surface, faces, ..Options::default() }

@@ -5,8 +5,11 @@ mod bars;
 mod digits;
 mod goal;
 mod info;
+mod interrupt;
 mod json;
 mod measure;
+mod memory;
+mod octree;
 mod print;
 mod render;
 mod repair;
@@ -15,14 +18,18 @@ mod summary;
 mod units;
 
 use args::{Args, Command};
-use clap::Parser;
 use std::process::ExitCode;
 use zmend::{Error, Result};
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = args::parse();
+    interrupt::listen();
     match run(&args) {
         Ok(code) => code,
+        Err(error @ Error::Cancelled) => {
+            print::error(&error);
+            ExitCode::from(interrupt::EXIT_CODE)
+        }
         Err(error) => {
             print::error(&error);
             ExitCode::FAILURE

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::Duration;
 use zmend::io::{Format, InputInfo, Precision};
-use zmend::{Options, RepairReport, Result, Surface};
+use zmend::{Inside, Options, RepairReport, Result, Surface};
 
 /// All that a repair has to tell.
 pub(crate) struct Summary<'a> {
@@ -22,6 +22,8 @@ pub(crate) struct Summary<'a> {
     pub(crate) after: Side,
     pub(crate) options: Options,
     pub(crate) report: RepairReport,
+    /// What was asked for and made no difference, in words.
+    pub(crate) ignored: Vec<String>,
     /// Wall-clock time of each stage, and in total.
     pub(crate) times: Vec<(&'static str, Duration)>,
     pub(crate) peak_memory: Option<u64>,
@@ -29,7 +31,7 @@ pub(crate) struct Summary<'a> {
 
 impl Summary<'_> {
     pub(crate) fn print(&self) -> Result<()> {
-        let cells = 1u64 << self.options.depth;
+        let cells = 1u64 << self.report.frame.depth();
         let cell = units::real(self.report.frame.cell_size());
         let mut table = Table::default();
         table.line("", &["before", "after"].map(|s| Some(s.to_owned())));
@@ -42,6 +44,8 @@ impl Summary<'_> {
             self.goal.display(),
             surface_name(self.options.surface),
         ))?;
+        let choice = &self.report.inside;
+        print::out(&format!("inside by {}: {}\n", inside_name(choice.rule), choice.reason))?;
         self.warnings().iter().for_each(print::warning);
         let seconds: Vec<String> =
             self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
@@ -66,8 +70,12 @@ impl Summary<'_> {
             "input": json::merged(json::side(&self.before), json::file(self.input)),
             "output": json::merged(json::side(&self.after), output),
             "options": {
-                "depth": self.options.depth,
+                "depth": frame.depth(),
+                "cell": self.options.cell,
                 "scale": self.options.scale,
+                "box": self.options.cube.map(|cube| json!({ "min": json::vector(cube.min), "size": cube.size })),
+                "max_memory": self.options.max_memory,
+                "inside": inside_name(self.options.inside),
                 "surface": surface_name(self.options.surface),
                 "faces": format!("{:?}", self.options.faces).to_lowercase(),
                 "threads": rayon::current_num_threads(),
@@ -90,6 +98,11 @@ impl Summary<'_> {
                 "odd_faces": closing.odd_faces,
                 "rings": closing.rings,
                 "switched": closing.switched,
+            },
+            "inside": {
+                "rule": inside_name(self.report.inside.rule),
+                "reason": self.report.inside.reason.to_string(),
+                "reversed": self.report.inside.reversed,
             },
             "octree": {
                 "crossings": self.report.crossings,
@@ -116,12 +129,13 @@ impl Summary<'_> {
     /// All that the user should know.
     fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.report.warnings.iter().map(ToString::to_string).collect();
+        warnings.extend_from_slice(&self.ignored);
         if self.input.trailing_bytes > 0 {
             let ignored = units::counted(self.input.trailing_bytes, "byte", "bytes");
             warnings.push(format!("{ignored} behind the end of the input's mesh were ignored"));
         }
         if self.loses_digits {
-            let problem = "binary STL files hold 7 digits, too few for cells so small so far from the origin";
+            let problem = "files of this format hold 7 digits, too few for cells so small so far from the origin";
             warnings.push(format!("{problem}: vertices may fall together; write PLY instead"));
         }
         if let Some(measured) = &self.after.measured
@@ -136,10 +150,15 @@ impl Summary<'_> {
     }
 }
 
-fn surface_name(surface: Surface) -> &'static str {
+fn inside_name(inside: Inside) -> String {
+    format!("{inside:?}").to_lowercase()
+}
+
+pub(crate) fn surface_name(surface: Surface) -> &'static str {
     match surface {
         Surface::MarchingCubes => "mc",
         Surface::DualContouring => "dc",
         Surface::Quads => "quads",
+        Surface::Blocks => "blocks",
     }
 }

@@ -1,9 +1,12 @@
 //! What `zmend repair` understands.
 
-use super::values::{depth_range, scale};
+use super::values::{bytes, cell, coordinate, depth_range, scale};
+use crate::goal::GoalFormat;
 use clap::{ArgGroup, ValueEnum};
+use glam::DVec3;
 use std::path::{Path, PathBuf};
-use zmend::io::Format;
+use zmend::geom::Cube;
+use zmend::io::{Format, OctreeFormat};
 
 /// Make a closed, manifold, oriented surface of any mesh.
 #[derive(Debug, clap::Args)]
@@ -15,16 +18,22 @@ Examples:
   zmend repair broken.stl fixed.stl
   zmend repair broken.obj -o fixed.ply --depth 9      twice as fine, four times the faces and time
   zmend repair part.stl fixed.stl --surface dc        keep sharp edges and corners
+  zmend repair part.stl fixed.stl --surface dc --no-self-intersections
+  zmend repair part.stl part.sog                      the signed octree, for TopoMender and others
+  zmend repair part.sog part.ply --surface dc         the surface of an octree file
+  zmend repair part.stl fixed.stl --cell 0.1          cells of a tenth of a unit
+  zmend repair a.stl b.stl --box -5 -5 -5 10 --depth 9          the same grid for several models
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
+  zmend repair parts.stl one.stl --inside winding     solids that overlap become one
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
 )]
 pub(crate) struct RepairArgs {
-    /// Mesh to repair.
+    /// Mesh to repair, or an octree to make a surface of (.sof, .sog, .dcf), which has a grid of its own.
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
-    /// File to write: .stl, .ply, .obj or .off.
+    /// File to write: .stl, .ply, .obj, .off, .glb or .3mf; or the octree alone, as .sof, .sog or .dcf.
     #[arg(value_name = "OUT")]
     out: Option<PathBuf>,
     /// The same as OUT.
@@ -33,6 +42,8 @@ pub(crate) struct RepairArgs {
 
     #[command(flatten)]
     pub(crate) grid: GridArgs,
+    #[command(flatten)]
+    pub(crate) inside: InsideArgs,
     #[command(flatten)]
     pub(crate) surface: SurfaceArgs,
     #[command(flatten)]
@@ -48,9 +59,50 @@ pub(crate) struct GridArgs {
     /// Resolution: 2^N cells a side, 3 to 18.
     #[arg(short, long, value_name = "N", default_value_t = 8, value_parser = depth_range(), allow_negative_numbers = true)]
     pub(crate) depth: u32,
-    /// Part of the grid that the longest side of the model takes, above 0 and below 1.
+    /// Resolution as the side of a cell, in the units of the model, instead of --depth. Cells have exactly this size.
+    #[arg(long, value_name = "SIZE", value_parser = cell, conflicts_with = "depth", allow_negative_numbers = true)]
+    pub(crate) cell: Option<f64>,
+    /// Part of the grid that the longest side of the model takes, above 0 and below 1; with --cell, the most that it takes.
     #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: f64,
+    /// Which of these options was given, if any was.
+    #[arg(skip)]
+    pub(crate) given: Option<&'static str>,
+    /// Where the grid lies, instead of --scale: its least corner and its side, in the units of the model. A model that does not fit inside
+    /// is refused. With --cell the least corner stays and the side grows to a power of two of cells.
+    #[arg(
+        long = "box",
+        value_names = ["X", "Y", "Z", "SIZE"],
+        num_args = 4,
+        value_parser = coordinate,
+        conflicts_with = "scale",
+        allow_negative_numbers = true
+    )]
+    cube: Option<Vec<f64>>,
+    /// Most memory to take, such as 500M or 4G: a repair that needs more is refused, and told what depth would do. All that is free when
+    /// not given.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub(crate) max_memory: Option<u64>,
+}
+
+impl GridArgs {
+    /// The names of those that place the grid.
+    pub(super) const IDS: [&'static str; 4] = ["depth", "cell", "scale", "cube"];
+
+    /// The grid's cube, if it was given.
+    pub(crate) fn cube(&self) -> Option<Cube> {
+        let [x, y, z, size] = *self.cube.as_deref()? else { return None };
+        Some(Cube { min: DVec3::new(x, y, z), size })
+    }
+}
+
+/// What is inside.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Inside")]
+pub(crate) struct InsideArgs {
+    /// How inside is told from outside.
+    #[arg(short, long = "inside", value_name = "RULE", value_enum, default_value_t = InsideArg::Auto)]
+    pub(crate) rule: InsideArg,
 }
 
 /// What is extracted.
@@ -60,9 +112,12 @@ pub(crate) struct SurfaceArgs {
     /// Kind of surface.
     #[arg(short = 's', long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
     pub(crate) kind: SurfaceArg,
-    /// What the faces are: auto is polygons for quads, triangles for mc and dc.
+    /// What the faces are: auto is polygons for quads and blocks, triangles for mc and dc.
     #[arg(long, value_name = "KIND", value_enum, default_value_t = FacesArg::Auto)]
     pub(crate) faces: FacesArg,
+    /// No face passes through another one. Some faces of dc and quads are cut in four for that; mc and blocks need no change.
+    #[arg(long)]
+    pub(crate) no_self_intersections: bool,
 }
 
 /// How the result is written.
@@ -105,11 +160,11 @@ impl RepairArgs {
 /// Kinds of faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FacesArg {
-    /// Polygons for quads, triangles for mc and dc.
+    /// Polygons for quads and blocks, triangles for mc and dc.
     Auto,
     /// Triangles.
     Triangles,
-    /// Quadrilaterals and a few triangles for dc and quads. Some programs cannot read PLY files with both.
+    /// Quadrilaterals and a few triangles for dc, quads and blocks. Some programs cannot read PLY files with both.
     Polygons,
 }
 
@@ -123,6 +178,27 @@ impl From<FacesArg> for zmend::Faces {
     }
 }
 
+/// Rules of what is inside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum InsideArg {
+    /// Look at the input, take one of the others, and tell which and why.
+    Auto,
+    /// What an odd number of walls keeps from the outside. Which way faces are turned makes no difference; overlaps become holes.
+    Parity,
+    /// What the faces go round, by the way they are turned: overlaps become unions, walls inside vanish, holes close smoothly.
+    Winding,
+}
+
+impl From<InsideArg> for zmend::Inside {
+    fn from(arg: InsideArg) -> Self {
+        match arg {
+            InsideArg::Auto => zmend::Inside::Auto,
+            InsideArg::Parity => zmend::Inside::Parity,
+            InsideArg::Winding => zmend::Inside::Winding,
+        }
+    }
+}
+
 /// Kinds of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SurfaceArg {
@@ -132,6 +208,8 @@ pub(crate) enum SurfaceArg {
     Dc,
     /// Dual contouring without sharp edges: smooth quadrilaterals.
     Quads,
+    /// Squares of one cell, as if built of blocks.
+    Blocks,
 }
 
 impl From<SurfaceArg> for zmend::Surface {
@@ -140,6 +218,7 @@ impl From<SurfaceArg> for zmend::Surface {
             SurfaceArg::Mc => zmend::Surface::MarchingCubes,
             SurfaceArg::Dc => zmend::Surface::DualContouring,
             SurfaceArg::Quads => zmend::Surface::Quads,
+            SurfaceArg::Blocks => zmend::Surface::Blocks,
         }
     }
 }
@@ -150,15 +229,26 @@ pub(crate) enum FormatArg {
     Ply,
     Obj,
     Off,
+    Glb,
+    #[value(name = "3mf")]
+    ThreeMf,
+    Sof,
+    Sog,
+    Dcf,
 }
 
-impl From<FormatArg> for Format {
+impl From<FormatArg> for GoalFormat {
     fn from(arg: FormatArg) -> Self {
         match arg {
-            FormatArg::Stl => Format::Stl,
-            FormatArg::Ply => Format::Ply,
-            FormatArg::Obj => Format::Obj,
-            FormatArg::Off => Format::Off,
+            FormatArg::Stl => GoalFormat::Mesh(Format::Stl),
+            FormatArg::Ply => GoalFormat::Mesh(Format::Ply),
+            FormatArg::Obj => GoalFormat::Mesh(Format::Obj),
+            FormatArg::Off => GoalFormat::Mesh(Format::Off),
+            FormatArg::Glb => GoalFormat::Mesh(Format::Glb),
+            FormatArg::ThreeMf => GoalFormat::Mesh(Format::ThreeMf),
+            FormatArg::Sof => GoalFormat::Octree(OctreeFormat::Sof),
+            FormatArg::Sog => GoalFormat::Octree(OctreeFormat::Sog),
+            FormatArg::Dcf => GoalFormat::Octree(OctreeFormat::Dcf),
         }
     }
 }

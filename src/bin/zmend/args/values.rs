@@ -20,6 +20,40 @@ pub(super) fn scale(text: &str) -> Result<f64, String> {
     Frame::fit(&unit, *DEPTHS.start(), scale).map(|_| scale).map_err(|e| e.to_string())
 }
 
+/// A number that the library takes as side of a cell.
+pub(super) fn cell(text: &str) -> Result<f64, String> {
+    let cell = coordinate(text)?;
+    let point = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ZERO };
+    Frame::fit_cells(&point, cell, 0.9).map(|_| cell).map_err(|e| e.to_string())
+}
+
+pub(super) fn coordinate(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|c: &f64| c.is_finite()).ok_or_else(|| "not a finite number".to_owned())
+}
+
+/// A number of bytes with a unit: K, M, G, T (thousands) or Ki, Mi, Gi, Ti (1024), with or without a B.
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    const UNITS: [(&str, f64); 9] = [
+        ("ki", 1024.0),
+        ("mi", 1024.0 * 1024.0),
+        ("gi", 1024.0 * 1024.0 * 1024.0),
+        ("ti", 1024.0 * 1024.0 * 1024.0 * 1024.0),
+        ("k", 1e3),
+        ("m", 1e6),
+        ("g", 1e9),
+        ("t", 1e12),
+        ("", 1.0),
+    ];
+    let lower = text.to_ascii_lowercase();
+    let plain = lower.strip_suffix('b').unwrap_or(&lower);
+    let (digits, unit) =
+        UNITS.iter().find_map(|(name, unit)| Some((plain.strip_suffix(name)?, unit))).unwrap_or(("", &1.0));
+    match digits.trim_end().parse::<f64>() {
+        Ok(number) if number.is_finite() && number * unit >= 1.0 => Ok((number * unit) as u64),
+        _ => Err("not a number of bytes such as 500M or 4G".to_owned()),
+    }
+}
+
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|degrees: &f64| degrees.is_finite()).ok_or_else(|| "not a number of degrees".to_owned())
 }
@@ -48,6 +82,13 @@ mod tests {
         }
         assert_eq!(scale("0.5"), Ok(0.5));
         assert!(["0", "1", "-1", "nan", "inf", "x"].iter().all(|bad| scale(bad).is_err()));
+        let sizes = ["1", "500M", "4G", "4gb", "1.5 GiB", "2KB", "1T"].map(bytes);
+        let expected = [1, 500_000_000, 4_000_000_000, 4_000_000_000, 1_610_612_736, 2000, 1_000_000_000_000];
+        assert_eq!(sizes, expected.map(Ok));
+        assert!(["", "G", "-1G", "0", "nan", "4X", "1e999"].iter().all(|bad| bytes(bad).is_err()));
+        assert_eq!(cell("0.25"), Ok(0.25));
+        assert!(["0", "-1", "nan", "inf", "x", "1e-320"].iter().all(|bad| cell(bad).is_err()));
+        assert!(coordinate("-1e9").is_ok() && coordinate("inf").is_err());
         assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
     }
 }

@@ -1,0 +1,260 @@
+//! Where the vertices of dual surfaces go.
+
+use super::dual::Placement;
+use super::layout::{Knot, Layout, Style};
+use crate::geom::normal::NormalCode;
+use crate::geom::qef::Qef;
+use crate::grid::brick::{Local, Plane};
+use crate::grid::cases::{CASES, inside_end};
+use crate::grid::{Axis, Corner};
+use crate::octree::SignedOctree;
+use crate::octree::cells::{Cells, Crossing, EdgeTable};
+use crate::octree::crossings::{Crossings, position};
+use glam::{DVec3, Vec3A};
+
+/// Vertices keep this distance from the sides of their cell, in cells.
+const CELL_MARGIN: f32 = 1.0 / 1024.0;
+/// How far each of several vertices of a cell is drawn to its own mass point. Two sheets can have one minimiser, as both sides of
+/// a thin edge do, and files that tell vertices apart by position only, as STL does, would join them: the trailing edge
+/// of a wing came back with 33 non-manifold edges.
+const APART: f32 = 1.0 / 64.0;
+
+/// From this squared length of the mean normal on, the normals of a sheet differ by no more than their codes do (0.6 degrees): its
+/// tangent planes are one plane, and the mass point lies on it.
+const FLAT: f32 = 0.9999;
+
+/// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
+const CREASED: f32 = 0.933;
+
+/// The tangent planes at the crossings round the cells of a brick, in cells from its least corner, and what they add up to for
+/// each cell.
+pub(super) struct Planes {
+    /// Point and outward unit normal of each crossing.
+    tangents: EdgeTable<(Vec3A, Vec3A)>,
+    /// For each cell, and those round the brick, whose sums are never read. Cells without crossings have empty sums.
+    sums: Box<[Qef; SUM_SIDE.pow(3)]>,
+}
+
+/// Cells a side of the table of sums: a brick and a layer on both sides.
+const SUM_SIDE: usize = 10;
+/// Entries before that of a cell for one step along each axis.
+const SUM_STEP: [usize; 3] = [SUM_SIDE * SUM_SIDE, SUM_SIDE, 1];
+/// For each axis, how far the four cells round an edge are before the one that starts where it does.
+const ROUND_EDGE: [[usize; 4]; 3] = {
+    let [x, y, z] = SUM_STEP;
+    [[0, y, z, y + z], [0, x, z, x + z], [0, x, y, x + y]]
+};
+
+impl Planes {
+    pub(super) fn new() -> Self {
+        Planes { tangents: EdgeTable::new((Vec3A::ZERO, Vec3A::ZERO)), sums: Box::new([Qef::EMPTY; SUM_SIDE.pow(3)]) }
+    }
+
+    fn sum_at([x, y, z]: [u32; 3]) -> usize {
+        (x as usize + 1) * SUM_STEP[0] + (y as usize + 1) * SUM_STEP[1] + z as usize + 1
+    }
+
+    /// Calls `place` with the cell and position of each vertex of a brick in order, in cells from the least corner of the brick. Returns
+    /// the cells with a crease or corner.
+    #[inline]
+    pub(super) fn place_brick(
+        &mut self,
+        layout: &Layout<'_>,
+        brick: usize,
+        placement: Placement<'_>,
+        mut place: impl FnMut(Local, Vec3A),
+    ) -> Plane {
+        let cells = Cells::new(layout.octree, brick);
+        if placement != Placement::Centre {
+            self.fill(&cells, layout.octree.crossings(), placement);
+        }
+        let given = given(layout.octree, brick, placement);
+        let mixed = layout.mixed(brick);
+        let origin = layout.octree.crossings().origin(cells.brick());
+        let side = 1 << layout.octree.crossings().depth();
+        let is_empty = |at: [i32; 3]| {
+            let global: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
+            layout.style == Style::Usual && global.iter().all(|&c| c < side) && !layout.is_mixed(global)
+        };
+        let mut creased = Plane::EMPTY;
+        let mut knots = layout.knots_of(brick).iter().peekable();
+        mixed.iter().for_each(|cell| {
+            let place = |p| place(cell, p);
+            let is_creased = match knots.next_if(|k| k.cell == cell) {
+                None => self.place_ordinary(cell, placement, given(cell), &is_empty, place),
+                Some(&knot) => self.place_knot(knot, placement, given(cell), layout.style, place),
+            };
+            if is_creased {
+                creased.set(cell);
+            }
+        });
+        creased
+    }
+
+    /// Calls `place` with one position for each mixed cell of a brick, however many sheets it has, in cells from the least corner of the
+    /// brick.
+    pub(super) fn place_cells(
+        &mut self,
+        octree: &SignedOctree,
+        brick: usize,
+        placement: Placement<'_>,
+        mut place: impl FnMut(Vec3A),
+    ) {
+        let cells = Cells::new(octree, brick);
+        self.fill(&cells, octree.crossings(), placement);
+        let given = given(octree, brick, placement);
+        cells
+            .mixed()
+            .iter()
+            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place));
+    }
+
+    fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
+        let sums = &mut self.sums;
+        self.tangents.fill(cells, |Crossing { axis, start, number, starts_inside }| {
+            let offset = position(crossings.offsets()[number as usize]) as f32;
+            let point = Vec3A::from(start.map(|c| c as f32)) + offset * Vec3A::AXES[axis.index()];
+            let normal = match placement {
+                Placement::SharpFeatures | Placement::Given { .. } => {
+                    NormalCode(crossings.normals()[number as usize]).decode(axis)
+                }
+                Placement::MassPoint | Placement::Centre => Vec3A::ZERO,
+            };
+            // Decoded normals point to the high end of the edge.
+            let normal = if starts_inside { normal } else { -normal };
+            let plane = Qef::of_plane(point, normal);
+            let last = Self::sum_at(start);
+            ROUND_EDGE[axis.index()].iter().for_each(|step| sums[last - step] += &plane);
+            (point, normal)
+        });
+    }
+
+    /// The sum for a cell, which is empty from then on.
+    fn take_sum(&mut self, cell: Local) -> Qef {
+        std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
+    }
+
+    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `is_empty` tells of a cell near
+    /// the brick whether it is in the grid and not mixed. Returns whether the cell has a crease or corner.
+    #[inline]
+    fn place_ordinary(
+        &mut self,
+        cell: Local,
+        placement: Placement<'_>,
+        given: Option<Vec3A>,
+        is_empty: &dyn Fn([i32; 3]) -> bool,
+        mut place: impl FnMut(Vec3A),
+    ) -> bool {
+        if placement == Placement::Centre {
+            place(least_corner(cell) + 0.5);
+            return false;
+        }
+        let sum = self.take_sum(cell);
+        place(given.unwrap_or_else(|| solve(cell, placement, &sum, is_empty)));
+        is_creased(placement, &sum)
+    }
+
+    /// The same for a cell with several sheets or vertices.
+    fn place_knot(
+        &mut self,
+        Knot { cell, mask }: Knot,
+        placement: Placement<'_>,
+        given: Option<Vec3A>,
+        style: Style,
+        mut place: impl FnMut(Vec3A),
+    ) -> bool {
+        self.take_sum(cell);
+        if style == Style::Disjoint {
+            return false;
+        }
+        let case = &CASES[usize::from(mask)];
+        if placement == Placement::Centre {
+            for vertex in 0..case.sheets.vertices {
+                let own = Corner::ALL.into_iter().filter(|c| case.sheets.vertex[c.index()] == vertex);
+                let (n, sum) = own.fold((0.0, Vec3A::ZERO), |(n, sum), c| (n + 1.0, sum + corner_of(c)));
+                place(least_corner(cell) + Vec3A::splat(0.5).lerp(sum / n, APART));
+            }
+            return false;
+        }
+        let tangent = self.tangents.at(cell);
+        let mut creased = false;
+        for sheet in 0..case.sheets.count {
+            let of_sheet = || {
+                let sheet_of = |edge| case.sheets.sheet[inside_end(mask, edge).index()];
+                case.cycles.iter().flatten().copied().filter(move |&edge| sheet_of(edge) == sheet)
+            };
+            let mut sum = Qef::EMPTY;
+            of_sheet().map(&tangent).for_each(|(p, n)| sum += &Qef::of_plane(p, n));
+            let common = given.unwrap_or_else(|| solve(cell, placement, &sum, &|_| false));
+            creased |= is_creased(placement, &sum);
+            if case.sheets.is_regular(sheet) {
+                let apart = if case.sheets.count > 1 { APART } else { 0.0 };
+                place(common.lerp(sum.mass_point(), apart));
+                continue;
+            }
+            // Each inside corner has a vertex: near the crossings round it, or between it and the middle of the cell.
+            for corner in Corner::ALL.into_iter().filter(|c| case.sheets.sheet[c.index()] == sheet) {
+                let around = of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| tangent(e).0);
+                let (n, sum) = around.fold((0.0, Vec3A::ZERO), |(n, sum), p| (n + 1.0, sum + p));
+                let between = least_corner(cell) + 0.25 + 0.5 * corner_of(corner);
+                // A corner that has no crossings is no place of the surface: its vertex only has to differ from the others.
+                place(if n > 0.0 { (sum / n).lerp(common, 0.25) } else { common.lerp(between, 0.25) });
+            }
+        }
+        creased
+    }
+}
+
+/// The given points of the cells of a brick, in cells from its least corner.
+fn given(octree: &SignedOctree, brick: usize, placement: Placement<'_>) -> impl Fn(Local) -> Option<Vec3A> {
+    let crossings = octree.crossings();
+    let brick = &crossings.bricks()[brick];
+    let origin = DVec3::from(crossings.origin(brick).map(f64::from));
+    let given = match placement {
+        Placement::Given { points, frame } => points.of_brick(brick.key).map(|points| (points, frame)),
+        _ => None,
+    };
+    move |cell| {
+        let (points, frame) = given?;
+        let point = DVec3::from(points.get(cell)?.map(f64::from));
+        Some(((point - frame.origin()) / frame.cell_size() - origin).as_vec3a())
+    }
+}
+
+/// A corner of the unit cell.
+fn corner_of(corner: Corner) -> Vec3A {
+    Vec3A::from(Axis::ALL.map(|a| f32::from(u8::from(corner & a))))
+}
+
+fn least_corner(cell: Local) -> Vec3A {
+    Vec3A::from(cell.coords().map(|c| c as f32))
+}
+
+/// Where the vertex of a sheet in a cell goes.
+#[inline]
+fn solve(cell: Local, placement: Placement<'_>, sum: &Qef, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
+    let corner = least_corner(cell);
+    let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
+    if !placement.needs_normals() || sum.flatness() >= FLAT {
+        return sum.mass_point().clamp(low, high);
+    }
+    let free = sum.minimiser();
+    if free.cmpge(low).all() && free.cmple(high).all() { free } else { solve_outside(low, high, sum, free, is_empty) }
+}
+
+/// The same where the minimiser lies outside of the cell. A crease may bulge through an edge of the grid and back, or a corner through a
+/// face: the crossings cancel, so the cell beyond has no vertex, and the true one belongs there. Such a vertex is drawn to its mass point
+/// a little, for up to four cells may have the same minimiser.
+#[cold]
+fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
+    let beyond = free.floor();
+    let is_near = free.cmpge(low - 1.0).all() && free.cmple(high + 1.0).all();
+    if is_near && is_creased(Placement::SharpFeatures, sum) && is_empty(beyond.to_array().map(|c| c as i32)) {
+        return free.clamp(beyond + CELL_MARGIN, beyond + (1.0 - CELL_MARGIN)).lerp(sum.mass_point(), APART);
+    }
+    sum.minimiser_within(low, high)
+}
+
+fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {
+    placement.needs_normals() && sum.flatness() < CREASED
+}
