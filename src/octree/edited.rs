@@ -16,9 +16,10 @@
 //! planes of a whole brick ([`EditedOctree::elements`]).
 
 use super::SignedOctree;
-use super::crossings::{finest_element, owner};
+use super::crossings::{finest_element, lattice_point, owner};
 use crate::grid::brick::Plane;
-use crate::grid::{Extent, Key};
+use crate::grid::key::SIDE;
+use crate::grid::{Corner, Extent, Key};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -44,6 +45,18 @@ impl EditedOctree {
             list.retain(|key| both.binary_search(key).is_err());
         }
         EditedOctree { signed, removed, added }
+    }
+
+    /// With further elements added, or removed; those that the other list has are taken out of it.
+    #[must_use]
+    pub fn with(self, elements: Vec<Key>, add: bool) -> Self {
+        let EditedOctree { signed, mut removed, mut added } = self;
+        if add {
+            added.extend(elements);
+        } else {
+            removed.extend(elements);
+        }
+        EditedOctree::new(signed, removed, added)
     }
 
     /// The solid of the signs, without any edit.
@@ -84,7 +97,7 @@ impl EditedOctree {
 
     /// Whether all corners of an element are inside by their signs.
     fn all_inside(&self, element: Key) -> bool {
-        let side = crate::grid::key::SIDE >> self.signed.crossings().depth();
+        let side = SIDE >> self.signed.crossings().depth();
         element.points().all(|p| self.signed.is_inside(p.center().map(|c| c / side)))
     }
 
@@ -111,7 +124,7 @@ impl EditedOctree {
 
     /// Whether a brick that the crossings do not list lies inside.
     pub fn is_uniformly_inside(&self, brick: Key) -> bool {
-        self.signed.is_inside(super::crossings::lattice_point(self.signed.crossings().depth(), brick))
+        self.signed.is_inside(lattice_point(self.signed.crossings().depth(), brick))
     }
 
     /// The bricks that own an edited element, sorted.
@@ -137,6 +150,20 @@ impl EditedOctree {
         }
     }
 
+    /// The number of finest cells that are removed, or beside an edited face: what the edits have touched.
+    pub fn changed_cells(&self) -> u64 {
+        let edits = self.removed.iter().chain(&self.added);
+        let mut cells: Vec<Key> = edits
+            .flat_map(|&key| {
+                let beside = (key.dir().dimension() == 2).then(|| key.coboundary());
+                beside.into_iter().flatten().chain(key.is_cell().then_some(key))
+            })
+            .collect();
+        cells.par_sort_unstable();
+        cells.dedup();
+        cells.len() as u64
+    }
+
     /// The Euler number of the solid: points less edges plus faces less cells. Cost: 50 ns a brick, in parallel; bricks that are wholly
     /// inside have none.
     pub fn euler_number(&self) -> i64 {
@@ -157,7 +184,7 @@ impl EditedOctree {
                 return Err(format!("the list of what is {name} is not sorted"));
             }
             for &element in list {
-                if finest_element(depth, super::crossings::lattice_point(depth, element), element.dir()) != element {
+                if finest_element(depth, lattice_point(depth, element), element.dir()) != element {
                     return Err(format!("{element} is {name}, but is not of the finest level"));
                 }
                 if self.all_inside(element) != (name == "removed") {
@@ -182,7 +209,7 @@ impl EditedOctree {
 /// The places in a sorted list of the finest elements that a brick owns: centres lie in it, or on its low faces.
 fn within(list: &[Key], brick: Key) -> Range<usize> {
     // The first and the last key of the brick along the Z-order curve have its corner bits all 0 and all 1.
-    let low = brick.corner(crate::grid::Corner::MIN).code();
+    let low = brick.corner(Corner::MIN).code();
     let span = u64::from(brick.size()).pow(3);
     let first = list.partition_point(|key| key.code() < low);
     let count = list[first..].partition_point(|key| key.code() < low + span);
@@ -190,7 +217,7 @@ fn within(list: &[Key], brick: Key) -> Range<usize> {
 }
 
 /// 1 for points and faces, -1 for edges and cells.
-fn alternating(extent: Extent) -> i64 {
+pub(crate) fn alternating(extent: Extent) -> i64 {
     if extent.dimension().is_multiple_of(2) { 1 } else { -1 }
 }
 

@@ -131,7 +131,12 @@ impl SignedOctree {
         SignedOctree::from_crossings(builder.finish())
     }
 
-    /// Crossings and signs, taken apart.
+    /// An octree of which nothing is inside.
+    pub fn empty(depth: u32) -> Self {
+        SignedOctree { crossings: Builder::new(depth, false).finish(), inside: Vec::new() }
+    }
+
+    /// Crossings and signs, as [`new`](Self::new) takes them.
     pub fn into_parts(self) -> (Crossings, Vec<Plane>) {
         (self.crossings, self.inside)
     }
@@ -169,7 +174,7 @@ impl SignedOctree {
         let mut planes = self.corners(i);
         for bit in [1, 2, 4] {
             for extent in (0..8).filter(|extent| extent & bit != 0) {
-                planes[extent] = planes[extent] & planes[extent ^ bit];
+                planes[extent] &= planes[extent ^ bit];
             }
         }
         planes
