@@ -30,6 +30,7 @@ mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub(crate) mod point_set;
 pub mod points;
 pub mod regions;
 pub mod segments;

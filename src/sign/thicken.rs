@@ -3,13 +3,16 @@
 //! An open sheet encloses nothing and vanishes. Here it becomes a wall: what is within half of a width of it is added to the solid. The faces
 //! are read a second time; those that the surface already follows need no wall, and neither do those inside of it.
 //!
-//! Which faces vanish is told by their hits. A triangle of which some lattice edge that it hits is not crossed by the surface, and starts
-//! outside, is lost there; so is one that hits none and is far from the surface. Of a lost triangle those points count that lie in cells
-//! without surface: a sheet that stands on a solid gets its wall up to where it does, and the solid's own faces get none.
+//! Which faces vanish is told by hits: a lattice edge outside that a face hits and the surface does not cross is lost. Faces count where they
+//! pass through cells that the surface does not, if an edge is lost near by, away from the surface; or if there is no surface about, for
+//! some triangles are so small that they hit nothing. So a sheet that stands on a solid gets its wall up to where it does, and the solid's
+//! own faces, edges and corners get none. What bounds a solid gets none either, however thin the solid is, and sheets that lie within two
+//! cells of a surface are taken for part of it.
 //!
-//! Cost: that of a [`Band`] of half the width, and some 0.3 us a brick for the union.
+//! Cost: that of a scan, and of a [`Band`] of half the width; some 50 ns a lattice point near a lost face, and 0.3 us a brick for the union.
 
 use super::band::{All, Band, MOST_CELLS, Wanted};
+use super::scan_oriented;
 use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::geom::frame::DEPTHS;
@@ -20,6 +23,7 @@ use crate::grid::{Axis, Key};
 use crate::mesh::TriangleSource;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::OrientedHits;
+use crate::octree::point_set::PointSet;
 use crate::octree::signed::{SignedOctree, Uniform};
 use crate::progress::Progress;
 use glam::{DVec3, Vec3};
@@ -44,18 +48,24 @@ const LEAST_RADIUS: f64 = 0.3;
 /// Edges that faces hit and that the surface does not cross, with both ends outside: a measure of open sheets, which vanish. A plane of area A,
 /// in cells, hits 1 to 1.7 A edges.
 pub fn vanished(hits: &OrientedHits, octree: &SignedOctree) -> u64 {
-    let edges = hits.edges();
-    let uniform = octree.uniform();
+    let lost = lost_edges(hits, octree);
+    lost.iter().flat_map(|(_, planes)| planes).map(|plane| u64::from(plane.count())).sum()
+}
+
+/// The bricks with such edges, sorted, and the edges along x, y, z, each at its start.
+fn lost_edges(hits: &OrientedHits, octree: &SignedOctree) -> Vec<(Key, [Plane; 3])> {
+    let (edges, uniform) = (hits.edges(), octree.uniform());
     let of_brick = |i: usize| {
         let brick = &edges.bricks()[i];
         let (crossed, inside) = match octree.crossings().find(brick.key) {
             Some(j) => (octree.crossings().bricks()[j].crossed, octree.inside()[j]),
-            None if uniform.is_inside(brick.key) => return 0,
+            None if uniform.is_inside(brick.key) => return None,
             None => ([Plane::EMPTY; 3], Plane::EMPTY),
         };
-        (0..3).map(|a| u64::from((brick.crossed[a] & !crossed[a] & !inside).count())).sum()
+        let lost = [0, 1, 2].map(|a| brick.crossed[a] & !crossed[a] & !inside);
+        (lost != [Plane::EMPTY; 3]).then_some((brick.key, lost))
     };
-    (0..edges.bricks().len()).into_par_iter().map(of_brick).sum()
+    (0..edges.bricks().len()).into_par_iter().filter_map(of_brick).collect()
 }
 
 /// Adds walls of `width` model units, half on each side, to the solids of `octree`, which was made from the same source and frame.
@@ -74,7 +84,10 @@ pub fn thicken(
     let radius = 0.5 * width / frame.cell_size();
     let band = match what {
         Thicken::All => Band::around_wanted(source, frame, radius, &All, progress)?,
-        Thicken::Sheets => Band::around_wanted(source, frame, radius, &Lost::new(octree, frame), progress)?,
+        Thicken::Sheets => {
+            let lost = Lost::new(octree, source, frame, progress)?;
+            Band::around_wanted(source, frame, radius, &lost, progress)?
+        }
     };
     Ok(united(octree, &band, radius))
 }
@@ -216,40 +229,42 @@ pub(super) fn clipped(key: Key, mut plane: Plane) -> Plane {
 struct Lost<'a> {
     octree: &'a SignedOctree,
     uniform: Uniform<'a>,
-    /// For each brick the cells that hold surface.
-    mixed: Vec<Plane>,
+    /// Cells that hold surface.
+    mixed: PointSet,
+    /// These and their neighbours.
+    about_mixed: PointSet,
+    /// Where an edge is near that is lost, away from any surface: cells, or starts of edges.
+    near_lost: PointSet,
     shift: u32,
 }
 
 impl<'a> Lost<'a> {
-    fn new(octree: &'a SignedOctree, frame: &Frame) -> Self {
-        let crossings = octree.crossings();
-        let bricks = (0..crossings.bricks().len()).into_par_iter();
-        let mixed = bricks.map(|i| crossings.mixed_cells(&crossings.bricks()[i])).collect();
-        Lost { octree, uniform: octree.uniform(), mixed, shift: frame.cell_shift() }
+    fn new(
+        octree: &'a SignedOctree,
+        source: &mut dyn TriangleSource,
+        frame: &Frame,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let (crossings, depth) = (octree.crossings(), frame.depth());
+        let mixed = crossings.bricks().iter().map(|brick| (brick.key, crossings.mixed_cells(brick)));
+        let mixed = PointSet::new(depth, mixed);
+        let about_mixed = mixed.dilated();
+        let hits = scan_oriented(source, frame, false, progress)?.hits;
+        // At the edges of a solid, a lattice edge may be hit twice in the tip of a wedge. Only what is lost farther out counts, and from there
+        // three cells back: to the surface on which a sheet stands.
+        let lost = lost_edges(&hits, octree);
+        let lost = lost.into_iter().map(|(key, [x, y, z])| (key, (x | y | z) & !about_mixed.plane(key)));
+        let near_lost = PointSet::new(depth, lost).dilated().dilated().dilated();
+        Ok(Lost { octree, uniform: octree.uniform(), mixed, about_mixed, near_lost, shift: frame.cell_shift() })
     }
 
-    /// The brick at a cell or point.
-    fn brick(&self, at: [u32; 3]) -> std::result::Result<usize, Option<Key>> {
+    fn is_inside(&self, at: [u32; 3]) -> bool {
         let crossings = self.octree.crossings();
         let key = Key::cell(crossings.depth() - 3, at.map(|c| c >> 3));
-        key.and_then(|key| crossings.find(key)).ok_or(key)
-    }
-
-    fn is_mixed(&self, cell: [u32; 3]) -> bool {
-        self.brick(cell).is_ok_and(|i| self.mixed[i].get(Local::new(cell[0], cell[1], cell[2])))
-    }
-
-    /// Whether an edge that a face hits is not crossed and starts outside.
-    fn loses(&self, axis: Axis, at: [u32; 3]) -> bool {
-        let local = Local::new(at[0], at[1], at[2]);
-        match self.brick(at) {
-            Ok(i) => {
-                let brick = &self.octree.crossings().bricks()[i];
-                !brick.crossed[axis.index()].get(local) && !self.octree.inside()[i].get(local)
-            }
-            Err(key) => !key.is_some_and(|key| self.uniform.is_inside(key)),
-        }
+        key.is_some_and(|key| match crossings.find(key) {
+            Some(i) => self.octree.inside()[i].get(Local::new(at[0], at[1], at[2])),
+            None => self.uniform.is_inside(key),
+        })
     }
 }
 
@@ -263,9 +278,9 @@ struct Witness<'a> {
 impl Hits for Witness<'_> {
     fn plane(&mut self, _: Axis, _: [f64; 3]) {}
 
-    fn hit(&mut self, axis: Axis, at: [u32; 3], _: u16) {
+    fn hit(&mut self, _: Axis, at: [u32; 3], _: u16) {
         self.hits += 1;
-        self.is_lost = self.is_lost || self.lost.loses(axis, at);
+        self.is_lost = self.is_lost || self.lost.near_lost.contains(at);
     }
 }
 
@@ -273,18 +288,15 @@ impl Wanted for Lost<'_> {
     fn triangle(&self, triangle: &FineTriangle) -> bool {
         let mut witness = Witness { lost: self, hits: 0, is_lost: false };
         rasterise(triangle, self.shift, &mut witness);
-        if witness.hits > 0 {
-            return witness.is_lost;
-        }
-        // Too small for the lattice. If there is no surface about it, it is lost, unless it is inside.
-        let centre: [i64; 3] = std::array::from_fn(|a| triangle.iter().map(|p| i64::from(p[a])).sum::<i64>() / 3);
-        let cell = centre.map(|c| (c >> self.shift) as u32);
-        let mut about =
-            (0..27u32).map(|n| std::array::from_fn(|a| (cell[a] + [n / 9, n / 3 % 3, n % 3][a]).saturating_sub(1)));
-        !about.any(|cell| self.is_mixed(cell)) && self.loses(Axis::X, cell)
+        // Some are too small for the lattice.
+        witness.is_lost || witness.hits == 0
     }
 
     fn point(&self, at: DVec3) -> bool {
-        !self.is_mixed(at.to_array().map(|c| c as u32))
+        let cell = at.to_array().map(|c| c as u32);
+        if self.near_lost.contains(cell) {
+            return !self.mixed.contains(cell);
+        }
+        !self.about_mixed.contains(cell) && !self.is_inside(cell)
     }
 }
