@@ -39,8 +39,9 @@
 //! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside.
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
-//!   through each other here and there, mostly at creases and in walls thinner than a cell.
+//! - **Faces of dual contouring may intersect**, here and there, mostly at creases and in walls thinner than a cell, unless
+//!   [`no_self_intersections`](Options::no_self_intersections) is asked for. Those of marching cubes and blocks never do.
+//! - **Sharp edges may have notches** where they pass through cells in which the grid sees one side of them only.
 //!
 //! # Where to find what
 //!
@@ -100,7 +101,7 @@ pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
 pub use glam;
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Faces, Options, RepairReport, Repaired, Surface, repair, repair_into};
+pub use repair::{Faces, Options, RepairReport, Repaired, Solid, Surface, repair, repair_into, solidify};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

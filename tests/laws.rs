@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{check_repaired, check_with, is_closed_mod_2, options, surfaces, together, topology_of, volume};
+use common::{check_repaired, check_with, is_closed_mod_2, surfaces, together, topology_of, volume};
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

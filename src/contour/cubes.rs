@@ -8,13 +8,13 @@
 //! [`cases`](crate::grid::cases)). Triangles stay in their cells, so different cells' never intersect.
 
 use super::PIECE;
-use super::cells::{Cells, EdgeTable};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::grid::brick::Local;
 use crate::grid::cases::CASES;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
+use crate::octree::cells::{Cells, EdgeTable};
 use crate::octree::crossings::{Crossings, position};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};

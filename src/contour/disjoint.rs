@@ -26,7 +26,8 @@
 //! # Cost
 //!
 //! Positions are kept (6 bytes a cell) until it is known which quadrilaterals are cut (1 byte a crossing), for the size of the mesh must
-//! be known before the first point is passed on. Time: about a tenth more for the whole repair, measured in docs/algorithms.md.
+//! be known before the first point is passed on. Contouring takes about 1.5 times as many instructions as without, in four passes instead
+//! of two; some 2 percent of the triangles are there for this alone.
 
 use super::PIECE;
 use super::dual::{DualOptions, Faces};
@@ -60,7 +61,7 @@ const POINT: Cut = 4;
 pub(super) fn disjoint_contouring(
     octree: &SignedOctree,
     frame: &Frame,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
@@ -138,7 +139,7 @@ fn rounded(cell: Local, p: Vec3A) -> InCell {
 fn place(
     layout: &Layout<'_>,
     planes: &mut Planes,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     range: Range<usize>,
 ) -> (Vec<InCell>, Vec<Plane>) {
     let mut positions = Vec::with_capacity((layout.first_of(range.end) - layout.first_of(range.start)) as usize);
@@ -298,7 +299,9 @@ impl Disjoint<'_> {
     fn points(&self, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
         let Layout { octree, .. } = self.placed.layout;
         let crossings = octree.crossings();
-        let mut points = Vec::new();
+        let on_edges = self.cut.points[range.end] - self.cut.points[range.start];
+        let in_cells = self.placed.layout.first_of(range.end) - self.placed.layout.first_of(range.start);
+        let mut points = Vec::with_capacity(on_edges as usize + in_cells as usize);
         for i in range {
             let brick = &crossings.bricks()[i];
             let origin = DVec3::from(crossings.origin(brick).map(f64::from));

@@ -20,16 +20,16 @@ use crate::grid::Axis;
 use crate::grid::brick::Plane;
 use crate::grid::cases::Mask;
 use crate::mesh::{MeshSink, MeshSizes};
-use crate::octree::SignedOctree;
 use crate::octree::crossings::Brick;
+use crate::octree::{SignedOctree, StoredPoints};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
 use glam::DVec3;
 use std::ops::Range;
 
 /// Where the vertices go.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Placement {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Placement<'a> {
     /// At the minimum of the quadratic error function, kept inside the cell: sharp edges and corners are kept. Needs normals.
     #[default]
     SharpFeatures,
@@ -39,6 +39,21 @@ pub enum Placement {
     /// it. Where blocks touch only along an edge or in a corner, each keeps 1/64 of a cell to itself, so that the surface does not meet
     /// itself there.
     Centre,
+    /// At points that are known already, as those of SOG files; cells without one are placed by [`SharpFeatures`](Self::SharpFeatures).
+    /// Several vertices of a cell keep a little apart from its point. Needs normals, to tell where creases are.
+    Given {
+        /// The points of the mixed cells of the octree.
+        points: &'a StoredPoints,
+        /// Where the grid lies in their space.
+        frame: &'a Frame,
+    },
+}
+
+impl Placement<'_> {
+    /// Whether it looks at the normals of crossings.
+    pub fn needs_normals(&self) -> bool {
+        matches!(self, Placement::SharpFeatures | Placement::Given { .. })
+    }
 }
 
 /// Whether faces may pass through each other.
@@ -52,10 +67,10 @@ pub enum Intersections {
 }
 
 /// How [`dual_contouring`] makes the surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct DualOptions {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DualOptions<'a> {
     /// Where the vertices go.
-    pub placement: Placement,
+    pub placement: Placement<'a>,
     /// Split quadrilaterals into triangles, along creases where there are any.
     pub triangles: bool,
     /// Whether faces may pass through each other. [`Placement::Centre`] has no such faces in any case.
@@ -73,13 +88,13 @@ pub struct DualOptions {
 pub fn dual_contouring(
     octree: &SignedOctree,
     frame: &Frame,
-    options: &DualOptions,
+    options: &DualOptions<'_>,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
     let crossings = octree.crossings();
     assert!(
-        options.placement != Placement::SharpFeatures || crossings.with_normals() || crossings.is_empty(),
+        !options.placement.needs_normals() || crossings.with_normals() || crossings.is_empty(),
         "sharp features need normals"
     );
     if options.intersections == Intersections::Avoid && options.placement != Placement::Centre {
@@ -129,7 +144,7 @@ impl Layout<'_> {
     fn place_vertices(
         &self,
         frame: &Frame,
-        placement: Placement,
+        placement: Placement<'_>,
         planes: &mut Planes,
         range: Range<usize>,
     ) -> (Vec<DVec3>, Vec<Plane>) {

@@ -4,11 +4,11 @@
 //! in the plane of mixed cells, corrected for the [knots](Knot) before it: cells with several vertices or none, of which there are few and
 //! which are listed.
 
-use super::cells::Cells;
 use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::{CASES, Mask};
 use crate::grid::{Axis, Corner, Key};
 use crate::octree::SignedOctree;
+use crate::octree::cells::Cells;
 use crate::octree::crossings::toward;
 use rayon::prelude::*;
 

@@ -1,6 +1,5 @@
 //! Where the vertices of dual surfaces go.
 
-use super::cells::{Cells, Crossing, EdgeTable};
 use super::dual::Placement;
 use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
@@ -8,8 +7,10 @@ use crate::geom::qef::Qef;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::cases::{CASES, inside_end};
 use crate::grid::{Axis, Corner};
+use crate::octree::SignedOctree;
+use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::{Crossings, position};
-use glam::Vec3A;
+use glam::{DVec3, Vec3A};
 
 /// Vertices keep this distance from the sides of their cell, in cells.
 const CELL_MARGIN: f32 = 1.0 / 1024.0;
@@ -60,7 +61,7 @@ impl Planes {
         &mut self,
         layout: &Layout<'_>,
         brick: usize,
-        placement: Placement,
+        placement: Placement<'_>,
         mut place: impl FnMut(Local, Vec3A),
     ) -> Plane {
         let cells = Cells::new(layout.octree, brick);
@@ -68,19 +69,20 @@ impl Planes {
             self.fill(&cells, layout.octree.crossings(), placement);
         }
         let mixed = layout.mixed(brick);
-        let origin = layout.octree.crossings().origin(cells.brick());
+        let origin = layout.octree.crossings().origin(&layout.octree.crossings().bricks()[brick]);
         let side = 1 << layout.octree.crossings().depth();
         let is_empty = |at: [i32; 3]| {
             let global: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
             layout.style == Style::Usual && global.iter().all(|&c| c < side) && !layout.is_mixed(global)
         };
+        let given = given(layout.octree, brick, placement);
         let mut creased = Plane::EMPTY;
         let mut knots = layout.knots_of(brick).iter().peekable();
         mixed.iter().for_each(|cell| {
             let place = |p| place(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
-                None => self.place_ordinary(cell, placement, &is_empty, place),
-                Some(&knot) => self.place_knot(knot, placement, layout.style, place),
+                None => self.place_ordinary(cell, placement, given(cell), &is_empty, place),
+                Some(&knot) => self.place_knot(knot, placement, given(cell), layout.style, place),
             };
             if is_creased {
                 creased.set(cell);
@@ -89,13 +91,32 @@ impl Planes {
         creased
     }
 
-    fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement) {
+    /// Calls `place` with one position for each mixed cell of a brick, however many sheets it has, in cells from the least corner of the
+    /// brick.
+    pub(super) fn place_cells(
+        &mut self,
+        octree: &SignedOctree,
+        brick: usize,
+        placement: Placement<'_>,
+        mut place: impl FnMut(Vec3A),
+    ) {
+        let cells = Cells::new(octree, brick);
+        self.fill(&cells, octree.crossings(), placement);
+        let given = given(octree, brick, placement);
+        cells.mixed().iter().for_each(|cell| {
+            self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place);
+        });
+    }
+
+    fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
         let sums = &mut self.sums;
         self.tangents.fill(cells, |Crossing { axis, start, number, starts_inside }| {
             let offset = position(crossings.offsets()[number as usize]) as f32;
             let point = Vec3A::from(start.map(|c| c as f32)) + offset * Vec3A::AXES[axis.index()];
             let normal = match placement {
-                Placement::SharpFeatures => NormalCode(crossings.normals()[number as usize]).decode(axis),
+                Placement::SharpFeatures | Placement::Given { .. } => {
+                    NormalCode(crossings.normals()[number as usize]).decode(axis)
+                }
                 Placement::MassPoint | Placement::Centre => Vec3A::ZERO,
             };
             // Decoded normals point to the high end of the edge.
@@ -118,7 +139,8 @@ impl Planes {
     fn place_ordinary(
         &mut self,
         cell: Local,
-        placement: Placement,
+        placement: Placement<'_>,
+        given: Option<Vec3A>,
         is_empty: &dyn Fn([i32; 3]) -> bool,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
@@ -127,7 +149,7 @@ impl Planes {
             return false;
         }
         let sum = self.take_sum(cell);
-        place(solve(cell, placement, &sum, is_empty));
+        place(given.unwrap_or_else(|| solve(cell, placement, &sum, is_empty)));
         is_creased(placement, &sum)
     }
 
@@ -135,7 +157,8 @@ impl Planes {
     fn place_knot(
         &mut self,
         Knot { cell, mask }: Knot,
-        placement: Placement,
+        placement: Placement<'_>,
+        given: Option<Vec3A>,
         style: Style,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
@@ -161,7 +184,7 @@ impl Planes {
             };
             let mut sum = Qef::EMPTY;
             of_sheet().map(&tangent).for_each(|(p, n)| sum += &Qef::of_plane(p, n));
-            let common = solve(cell, placement, &sum, &|_| false);
+            let common = given.unwrap_or_else(|| solve(cell, placement, &sum, &|_| false));
             creased |= is_creased(placement, &sum);
             if case.sheets.is_regular(sheet) {
                 let apart = if case.sheets.count > 1 { APART } else { 0.0 };
@@ -181,6 +204,22 @@ impl Planes {
     }
 }
 
+/// The given points of the cells of a brick, in cells from its least corner.
+fn given(octree: &SignedOctree, brick: usize, placement: Placement<'_>) -> impl Fn(Local) -> Option<Vec3A> {
+    let crossings = octree.crossings();
+    let brick = &crossings.bricks()[brick];
+    let origin = DVec3::from(crossings.origin(brick).map(f64::from));
+    let given = match placement {
+        Placement::Given { points, frame } => points.of_brick(brick.key).map(|points| (points, frame)),
+        _ => None,
+    };
+    move |cell| {
+        let (points, frame) = given?;
+        let point = DVec3::from(points.get(cell)?.map(f64::from));
+        Some(((point - frame.origin()) / frame.cell_size() - origin).as_vec3a())
+    }
+}
+
 /// A corner of the unit cell.
 fn corner_of(corner: Corner) -> Vec3A {
     Vec3A::from(Axis::ALL.map(|a| f32::from(u8::from(corner & a))))
@@ -192,10 +231,10 @@ fn least_corner(cell: Local) -> Vec3A {
 
 /// Where the vertex of a sheet in a cell goes.
 #[inline]
-fn solve(cell: Local, placement: Placement, sum: &Qef, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
+fn solve(cell: Local, placement: Placement<'_>, sum: &Qef, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
     let corner = least_corner(cell);
     let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
-    if placement != Placement::SharpFeatures || sum.flatness() >= FLAT {
+    if !placement.needs_normals() || sum.flatness() >= FLAT {
         return sum.mass_point().clamp(low, high);
     }
     let free = sum.minimiser();
@@ -209,12 +248,12 @@ fn solve(cell: Local, placement: Placement, sum: &Qef, is_empty: &dyn Fn([i32; 3
 fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
     let beyond = free.floor();
     let is_near = free.cmpge(low - 1.0).all() && free.cmple(high + 1.0).all();
-    if is_near && is_creased(Placement::SharpFeatures, sum) && is_empty(beyond.to_array().map(|c| c as i32)) {
+    if is_near && sum.flatness() < CREASED && is_empty(beyond.to_array().map(|c| c as i32)) {
         return free.clamp(beyond + CELL_MARGIN, beyond + (1.0 - CELL_MARGIN)).lerp(sum.mass_point(), APART);
     }
     sum.minimiser_within(low, high)
 }
 
-fn is_creased(placement: Placement, sum: &Qef) -> bool {
-    placement == Placement::SharpFeatures && sum.flatness() < CREASED
+fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {
+    placement.needs_normals() && sum.flatness() < CREASED
 }

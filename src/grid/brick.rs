@@ -61,6 +61,21 @@ impl Plane {
     /// All bits set.
     pub const FULL: Plane = Plane([!0; 8]);
 
+    /// The positions of a cube of `side` (1, 2, 4 or 8) whose least one is `at`, which is a multiple of the side on every axis.
+    pub const fn cube(at: Local, side: u32) -> Plane {
+        debug_assert!(at.0 as u32 & (0o111 * (side - 1)) == 0, "cubes of the octree lie at multiples of their side");
+        let row = (1u64 << side) - 1;
+        let square = row * (Z0 & (!0 >> (64 - 8 * side)));
+        let [x, y, z] = at.coords();
+        let mut plane = Plane::EMPTY;
+        let mut i = 0;
+        while i < side {
+            plane.0[(x + i) as usize] = square << (8 * y + z);
+            i += 1;
+        }
+        plane
+    }
+
     /// The bit at `p`.
     pub const fn get(&self, p: Local) -> bool {
         self.0[p.word()] & p.bit() != 0
@@ -305,6 +320,17 @@ mod tests {
             prop_assert_eq!(a & b, plane_from(|[x, y, z]| a.get(Local::new(x, y, z)) & b.get(Local::new(x, y, z))));
             prop_assert_eq!(a | b, !(!a & !b));
             prop_assert_eq!(a ^ b, (a | b) & !(a & b));
+        }
+    }
+
+    #[test]
+    fn cubes_are_cubes() {
+        for side in [1, 2, 4, 8] {
+            for at in (0..512).map(Local::from_index).filter(|at| at.coords().iter().all(|c| c % side == 0)) {
+                let is_in = |p: &Local| (0..3).all(|a| p.coords()[a] / side == at.coords()[a] / side);
+                let expected = (0..512).map(Local::from_index).filter(is_in);
+                assert!(Plane::cube(at, side).iter().eq(expected), "{side} at {at:?}");
+            }
         }
     }
 

@@ -37,7 +37,7 @@ pub(super) struct Patch {
     /// Where in the file.
     pub(super) position: u64,
     /// The right bytes.
-    pub(super) bytes: [u8; 4],
+    pub(super) bytes: Vec<u8>,
 }
 
 /// A buffer that is filled by storing into room that is already there, not by appending.

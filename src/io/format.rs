@@ -1,5 +1,9 @@
 //! Which format a file has, from its content first.
 
+#[cfg(feature = "gltf")]
+use super::gltf;
+#[cfg(feature = "3mf")]
+use super::threemf;
 use super::{off, ply, stl, text};
 use crate::error::{Error, Place, Result};
 use std::fmt;
@@ -17,7 +21,16 @@ pub enum Format {
     Obj,
     /// Object file format (Geomview); text.
     Off,
+    /// glTF 2.0 with its document as text; read only. Needs the feature `gltf`.
+    Gltf,
+    /// glTF 2.0 in one binary file. Needs the feature `gltf`.
+    Glb,
+    /// 3D Manufacturing Format: XML in a ZIP archive. Needs the feature `3mf`.
+    ThreeMf,
 }
+
+/// How names of files to write may end.
+pub(super) const NAMES: &str = ".stl, .ply, .obj, .off, .glb or .3mf";
 
 /// How numbers are written in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,6 +51,9 @@ impl Format {
             "ply" => Some(Format::Ply),
             "obj" => Some(Format::Obj),
             "off" => Some(Format::Off),
+            "gltf" => Some(Format::Gltf),
+            "glb" => Some(Format::Glb),
+            "3mf" => Some(Format::ThreeMf),
             _ => None,
         }
     }
@@ -49,7 +65,29 @@ impl Format {
             Format::Ply => "ply",
             Format::Obj => "obj",
             Format::Off => "off",
+            Format::Gltf => "gltf",
+            Format::Glb => "glb",
+            Format::ThreeMf => "3mf",
         }
+    }
+
+    /// Whether faces of more than three corners are cut when they are written.
+    pub fn has_only_triangles(self) -> bool {
+        matches!(self, Format::Stl | Format::Gltf | Format::Glb | Format::ThreeMf)
+    }
+
+    /// Whether coordinates can be written in no more than single precision.
+    pub fn is_single(self, is_text: bool) -> bool {
+        matches!(self, Format::Stl if !is_text) || matches!(self, Format::Gltf | Format::Glb)
+    }
+
+    /// The error for a format of which this build knows nothing but the name.
+    #[cfg(not(all(feature = "gltf", feature = "3mf")))]
+    #[cold]
+    pub(super) fn unknown(self, name: &str) -> Error {
+        let feature = if self == Format::ThreeMf { "3mf" } else { "gltf" };
+        let problem = format!("{self} is not among the formats of this build");
+        Error::format(name, Place::Whole, problem, format!("build zmend with the feature `{feature}`"))
     }
 
     /// The format of a file of `len` bytes that begins with `prefix`: what the content says for sure, else `hint`, else
@@ -57,7 +95,7 @@ impl Format {
     pub(super) fn detect(name: &str, prefix: &[u8], len: u64, hint: Option<Format>) -> Result<Format> {
         Format::sniff(prefix, len).or(hint).or_else(|| looks_like_obj(prefix).then_some(Format::Obj)).ok_or_else(|| {
             let problem = "neither the content nor the name says which format this is";
-            Error::format(name, Place::Whole, problem, "give it a name that ends in .stl, .ply, .obj or .off")
+            Error::format(name, Place::Whole, problem, format!("give it a name that ends in {NAMES}"))
         })
     }
 
@@ -65,6 +103,16 @@ impl Format {
     fn sniff(prefix: &[u8], len: u64) -> Option<Format> {
         if stl::is_exactly_binary(prefix, len) {
             return Some(Format::Stl);
+        }
+        #[cfg(feature = "3mf")]
+        if threemf::is_zip(prefix) {
+            return Some(Format::ThreeMf);
+        }
+        #[cfg(feature = "gltf")]
+        if prefix.starts_with(gltf::MAGIC) {
+            return Some(Format::Glb);
+        } else if gltf::is_text(prefix) {
+            return Some(Format::Gltf);
         }
         let text = text::decode(prefix);
         let mut cursor = text::Text::new("", &text);
@@ -88,6 +136,9 @@ impl fmt::Display for Format {
             Format::Ply => "PLY",
             Format::Obj => "OBJ",
             Format::Off => "OFF",
+            Format::Gltf => "glTF",
+            Format::Glb => "GLB",
+            Format::ThreeMf => "3MF",
         })
     }
 }
@@ -130,10 +181,11 @@ mod tests {
     #[test]
     fn names_say_formats_in_any_case() {
         assert_eq!(Format::from_path("a/b.c.StL"), Some(Format::Stl));
-        for format in [Format::Stl, Format::Ply, Format::Obj, Format::Off] {
+        let all = [Format::Stl, Format::Ply, Format::Obj, Format::Off, Format::Gltf, Format::Glb, Format::ThreeMf];
+        for format in all {
             assert_eq!(Format::from_path(format!("x.{}", format.extension())), Some(format));
         }
         assert_eq!(Format::from_path("stl"), None);
-        assert_eq!(Format::from_path("x.gltf"), None);
+        assert_eq!(Format::from_path("x.jpeg"), None);
     }
 }

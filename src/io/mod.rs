@@ -20,18 +20,28 @@ mod bytes;
 mod encode;
 mod file;
 mod format;
+#[cfg(feature = "gltf")]
+mod gltf;
 mod input;
 mod number;
 mod obj;
+mod octree;
 mod off;
 mod ply;
+#[cfg(any(feature = "gltf", feature = "3mf"))]
+mod scene;
 mod stl;
 mod text;
+#[cfg(feature = "3mf")]
+mod threemf;
 mod write;
 
 pub use encode::Precision;
 pub use format::{Encoding, Format};
 pub use input::{Input, InputInfo, open};
+pub use octree::{
+    OctreeFile, OctreeFormat, OctreeInfo, read_octree, read_octree_bytes, write_dcf, write_sof, write_sog,
+};
 pub use write::{WriteOptions, Writer, create, write};
 
 use crate::error::{Error, Place, Result};
@@ -74,6 +84,16 @@ fn parse(name: &str, bytes: &[u8], format: Format) -> Result<Parsed> {
         return Err(Error::format(name, Place::Whole, "the file is empty", "copy or export it again"));
     }
     match format {
+        #[cfg(feature = "gltf")]
+        Format::Gltf => gltf::parse_text(name, bytes),
+        #[cfg(feature = "gltf")]
+        Format::Glb => gltf::parse_binary(name, bytes),
+        #[cfg(not(feature = "gltf"))]
+        Format::Gltf | Format::Glb => Err(format.unknown(name)),
+        #[cfg(feature = "3mf")]
+        Format::ThreeMf => threemf::parse(name, bytes),
+        #[cfg(not(feature = "3mf"))]
+        Format::ThreeMf => Err(format.unknown(name)),
         Format::Ply => ply::parse(name, bytes),
         Format::Obj => obj::parse(name, &text::decode(bytes)),
         Format::Off => off::parse(name, &text::decode(bytes)),

@@ -3,6 +3,7 @@
 use super::Format;
 use super::encode::{Encoder, LineEncoder, Out, Precision};
 use super::file::AtomicFile;
+use super::format::NAMES;
 use super::ply::PlyEncoder;
 use super::stl::StlEncoder;
 use crate::error::{Error, Place, Result};
@@ -61,6 +62,19 @@ pub fn create(path: impl AsRef<Path>, format: Format, options: WriteOptions) -> 
         (Format::Stl, false, _) => Box::new(StlEncoder::binary(name)),
         (Format::Stl, true, Precision::Single) => Box::new(StlEncoder::<Vec3>::text(name, precision)),
         (Format::Stl, true, Precision::Double) => Box::new(StlEncoder::<DVec3>::text(name, precision)),
+        #[cfg(feature = "gltf")]
+        (Format::Glb, ..) => Box::new(super::gltf::GlbEncoder::new(name)),
+        #[cfg(feature = "3mf")]
+        (Format::ThreeMf, ..) => Box::new(super::threemf::ThreeMfEncoder::new(name, precision)),
+        #[cfg(feature = "gltf")]
+        (Format::Gltf, ..) => {
+            let problem = "glTF is written in one binary file only";
+            return Err(Error::format(name, Place::Whole, problem, "give it a name that ends in .glb"));
+        }
+        #[cfg(not(feature = "gltf"))]
+        (Format::Gltf | Format::Glb, ..) => return Err(format.unknown(&name)),
+        #[cfg(not(feature = "3mf"))]
+        (Format::ThreeMf, ..) => return Err(format.unknown(&name)),
         (Format::Obj, ..) => Box::new(LineEncoder::obj(precision)),
         (Format::Off, ..) => Box::new(LineEncoder::off(precision)),
     };
@@ -84,7 +98,7 @@ pub fn create(path: impl AsRef<Path>, format: Format, options: WriteOptions) -> 
 pub fn write(path: impl AsRef<Path>, mesh: &Mesh, options: WriteOptions) -> Result<u64> {
     let path = path.as_ref();
     let format = Format::from_path(path).ok_or_else(|| {
-        let remedy = "give it a name that ends in .stl, .ply, .obj or .off";
+        let remedy = format!("give it a name that ends in {NAMES}");
         Error::format(path.display().to_string(), Place::Whole, "the name says no format to write", remedy)
     })?;
     let most_corners = mesh.faces.iter().map(<[u32]>::len).max().unwrap_or(0);

@@ -20,11 +20,13 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+pub(crate) mod cells;
 pub mod crossings;
 mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub mod points;
 pub mod segments;
 pub mod signed;
 mod traverse;
@@ -41,6 +43,7 @@ use crate::grid::key::MAX_LEVEL;
 
 pub use crossings::Crossings;
 pub use neighbour::Neighbours;
+pub use points::{CellPoints, StoredPoints};
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
 pub use validate::Violation;

@@ -6,7 +6,7 @@ use std::ops::{Index, IndexMut, Range};
 ///
 /// A plain vector doubles, and while it moves both copies are held; its memory cannot come from what smaller blocks have given back. Here
 /// every segment is an allocation of moderate size, so that a long list can grow into the room that another one leaves behind.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Segments<T, const BITS: u32> {
     segments: Vec<Vec<T>>,
     len: usize,

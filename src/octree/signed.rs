@@ -1,5 +1,6 @@
 //! Inside and outside at every lattice point: what repair, topology and contouring meet in.
 
+use super::cells::Cells;
 use super::crossings::{Builder, Crossings, Sample, finest_element, position, toward};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
@@ -138,6 +139,14 @@ impl SignedOctree {
     /// For each brick, its points that are inside.
     pub fn inside(&self) -> &[Plane] {
         &self.inside
+    }
+
+    /// The cells of brick `i` with corners of both signs.
+    ///
+    /// # Panics
+    /// When there is no brick `i`.
+    pub fn mixed_cells(&self, i: usize) -> Plane {
+        Cells::new(self, i).mixed()
     }
 
     /// Whether lattice point `at` (in cells, 0 ..= 2^depth) is inside. Cost: a hash probe a brick along x until one is found.

@@ -99,25 +99,37 @@ impl Patch {
         });
         for y in ys {
             let [px, py] = [xs.start, y].map(|i| (i * SUB + SUB / 2) as i32);
-            let mut weights = sides.map(|[p, q]| edge_function(p, q, [px, py]));
-            let row = &mut samples[(y as usize - first) * width..][xs.start as usize..xs.end as usize];
-            let mut entered = false;
-            for sample in row {
-                if (0..3).all(|k| weights[k] >= bias[k]) {
-                    entered = true;
-                    let weight = weights.map(|w| w as f32);
-                    let depth = (0..3).map(|k| weight[k] * self.depth[k]).sum::<f32>() / area;
-                    if depth > sample.depth {
-                        let on_wire = (0..3).any(|k| weight[k] < reach[k] && self.edges >> k & 1 == 1);
-                        *sample = Sample { depth, light: if on_wire { WIRE } else { self.light } };
-                    }
-                } else if entered {
-                    break;
+            let start = sides.map(|[p, q]| edge_function(p, q, [px, py]));
+            let span = span(start, bias, dy.map(|dy| dy * SUB), xs.end - xs.start);
+            let mut weights: [i64; 3] = std::array::from_fn(|k| start[k] - span.start * dy[k] * SUB);
+            let row = &mut samples[(y as usize - first) * width + xs.start as usize..];
+            for sample in &mut row[span.start as usize..span.end as usize] {
+                let weight = weights.map(|w| w as f32);
+                let depth = (0..3).map(|k| weight[k] * self.depth[k]).sum::<f32>() / area;
+                if depth > sample.depth {
+                    let on_wire = (0..3).any(|k| weight[k] < reach[k] && self.edges >> k & 1 == 1);
+                    *sample = Sample { depth, light: if on_wire { WIRE } else { self.light } };
                 }
                 (0..3).for_each(|k| weights[k] -= dy[k] * SUB);
             }
         }
     }
+}
+
+/// The steps of a row, of `len`, at which no weight is below its bias: weights begin as `start` and fall by `fall` a step. May be empty,
+/// but never lies outside of the row.
+fn span(start: [i64; 3], bias: [i64; 3], fall: [i64; 3], len: i64) -> std::ops::Range<i64> {
+    let (mut from, mut to) = (0, len);
+    for k in 0..3 {
+        let room = start[k] - bias[k];
+        match fall[k].signum() {
+            1 => to = to.min(room.div_euclid(fall[k]) + 1),
+            -1 => from = from.max((-room - fall[k] - 1).div_euclid(-fall[k])),
+            _ if room < 0 => to = from,
+            _ => {}
+        }
+    }
+    if from < to { from..to } else { 0..0 }
 }
 
 /// Twice the area of a triangle in squared subdivisions, positive when counter-clockwise.
@@ -252,4 +264,26 @@ fn transposed(from: &[[f32; 2]], width: usize, height: usize) -> Vec<[f32; 2]> {
         }
     });
     to
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn spans_are_where_all_weights_suffice(
+            start in prop::array::uniform3(-300i64..300),
+            bias in prop::array::uniform3(0i64..2),
+            fall in prop::array::uniform3(-9i64..9),
+            len in 0i64..40,
+        ) {
+            let span = span(start, bias, fall, len);
+            prop_assert!(0 <= span.start && span.end <= len);
+            for n in 0..len {
+                prop_assert_eq!(span.contains(&n), (0..3).all(|k| start[k] - n * fall[k] >= bias[k]), "{}", n);
+            }
+        }
+    }
 }

@@ -2,15 +2,15 @@
 
 mod options;
 mod report;
+mod solid;
 
 pub use options::{Faces, Options, Surface};
 pub use report::{RepairReport, Warning};
+pub use solid::Solid;
 
-use crate::contour::{DualOptions, Intersections, Placement, dual_contouring, marching_cubes};
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
-use crate::octree::SignedOctree;
 use crate::progress::{Progress, Silent, Stage};
 use crate::sign::{close, parity_signs, scan};
 use report::Clock;
@@ -56,6 +56,23 @@ pub fn repair_into(
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<RepairReport> {
+    let (solid, mut report) = solidify(source, options, progress)?;
+    let mut clock = Clock::default();
+    report.sizes = clock.time(Stage::Contour, || solid.extract(options, sink, progress))?;
+    report.times.append(&mut clock.times);
+    Ok(report)
+}
+
+/// Repairs whatever `source` yields, but extracts no surface: the solid can be written as an octree file or be extracted in several ways.
+/// The report's sizes are those of no mesh. Crossings have normals if [`Surface::needs_normals`] of the options' surface says so.
+///
+/// # Errors
+/// As [`repair_into`].
+pub fn solidify(
+    source: &mut dyn TriangleSource,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<(Solid, RepairReport)> {
     let mut clock = Clock::default();
     progress.begin(Stage::Read, 0);
     let bounds = clock.time(Stage::Read, || source.bounds())?;
@@ -70,7 +87,6 @@ pub fn repair_into(
         progress.begin(Stage::Sign, 0);
         parity_signs(crossings)
     });
-    let sizes = clock.time(Stage::Contour, || extract(&octree, &frame, options, sink, progress))?;
 
     let counts = scanned.counts;
     if !bounds.is_empty() && octree.crossings().is_empty() {
@@ -82,7 +98,7 @@ pub fn repair_into(
         (counts.merged_walls, Warning::WallsMerged),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
-    Ok(RepairReport {
+    let report = RepairReport {
         bounds,
         frame,
         scan: counts,
@@ -91,33 +107,11 @@ pub fn repair_into(
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
         volume: octree.volume() * frame.cell_size().powi(3),
-        sizes,
+        sizes: MeshSizes::default(),
         warnings,
         times: clock.times,
-    })
-}
-
-/// Extracts the surface that the options ask for.
-fn extract(
-    octree: &SignedOctree,
-    frame: &Frame,
-    options: &Options,
-    sink: &mut (dyn MeshSink + Send),
-    progress: &dyn Progress,
-) -> Result<MeshSizes> {
-    let placement = match options.surface {
-        Surface::MarchingCubes => return marching_cubes(octree, frame, sink, progress),
-        Surface::DualContouring => Placement::SharpFeatures,
-        Surface::Quads => Placement::MassPoint,
-        Surface::Blocks => Placement::Centre,
     };
-    let intersections = if options.no_self_intersections { Intersections::Avoid } else { Intersections::Allow };
-    let triangles = match options.faces {
-        Faces::Auto => options.surface == Surface::DualContouring,
-        Faces::Triangles => true,
-        Faces::Polygons => false,
-    };
-    dual_contouring(octree, frame, &DualOptions { placement, triangles, intersections }, sink, progress)
+    Ok((Solid { octree, frame, points: None }, report))
 }
 
 /// An input without faces gets the unit cube: all checks of options apply, and the result is empty.

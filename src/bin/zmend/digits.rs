@@ -21,13 +21,25 @@ enum Need {
 
 /// The precision that is written, and whether it is too low for the grid, because `format` can do no better.
 pub(crate) fn choose(bounds: &Bounds, options: &Options, format: Format, is_text: bool) -> Result<(Precision, bool)> {
-    let is_single = format == Format::Stl && !is_text;
-    match need(bounds, options)? {
+    chosen(need(bounds, options)?, farthest(bounds), format, is_text)
+}
+
+/// The same where the grid is known.
+pub(crate) fn of_frame(frame: &Frame, format: Format, is_text: bool) -> Result<(Precision, bool)> {
+    let corners = Bounds { min: frame.origin(), max: frame.origin() + frame.size() };
+    let far = farthest(&corners);
+    chosen(need_at(far, frame.cell_size()), far, format, is_text)
+}
+
+fn chosen(need: Need, far: f64, format: Format, is_text: bool) -> Result<(Precision, bool)> {
+    let is_single = format.is_single(is_text);
+    match need {
         Need::Single => Ok((Precision::Single, false)),
         Need::Digits if is_single => Ok((Precision::Single, true)),
         Need::Range if is_single => {
-            let problem = format!("binary STL cannot hold numbers such as {:e}", farthest(bounds));
-            Err(Error::setting("format", problem, "write PLY, or text with --ascii"))
+            let kind = if format == Format::Stl { "binary STL".to_owned() } else { format.to_string() };
+            let problem = format!("{kind} cannot hold numbers such as {far:e}");
+            Err(Error::setting("format", problem, "write PLY, or STL as text with --ascii"))
         }
         Need::Digits | Need::Range => Ok((Precision::Double, false)),
     }
@@ -38,14 +50,18 @@ fn need(bounds: &Bounds, options: &Options) -> Result<Need> {
         return Ok(Need::Single);
     }
     let cell = Frame::fit(bounds, options.depth, options.scale)?.cell_size();
-    let far = farthest(bounds) + cell;
-    Ok(if far > f64::from(f32::MAX) || cell / STEPS < f64::from(f32::MIN_POSITIVE) {
+    Ok(need_at(farthest(bounds) + cell, cell))
+}
+
+/// What cells of this size need so far from the origin.
+fn need_at(far: f64, cell: f64) -> Need {
+    if far > f64::from(f32::MAX) || cell / STEPS < f64::from(f32::MIN_POSITIVE) {
         Need::Range
     } else if far / f64::from(1 << 24) > cell / STEPS {
         Need::Digits
     } else {
         Need::Single
-    })
+    }
 }
 
 /// The greatest coordinate, whatever its sign.

@@ -1,9 +1,36 @@
 //! Where results go, looked at before any work begins.
 
+use std::fmt;
 use std::fs;
 use std::path::Path;
-use zmend::io::Format;
+use zmend::io::{Format, OctreeFormat};
 use zmend::{Error, Place, Result};
+
+/// What is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum GoalFormat {
+    Mesh(Format),
+    Octree(OctreeFormat),
+}
+
+impl GoalFormat {
+    /// The usual end of file names.
+    pub(crate) fn extension(self) -> &'static str {
+        match self {
+            GoalFormat::Mesh(format) => format.extension(),
+            GoalFormat::Octree(format) => format.extension(),
+        }
+    }
+}
+
+impl fmt::Display for GoalFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            GoalFormat::Mesh(format) => format.fmt(f),
+            GoalFormat::Octree(format) => format.fmt(f),
+        }
+    }
+}
 
 fn refuse(path: &Path, problem: &str, remedy: &str) -> Error {
     Error::format(path.display().to_string(), Place::Whole, problem, remedy)
@@ -34,8 +61,21 @@ pub(crate) fn check(path: &Path, inputs: &[&Path], force: bool) -> Result<()> {
 }
 
 /// The format to write: the one asked for, else the one that the name says.
-pub(crate) fn format(path: &Path, asked: Option<Format>) -> Result<Format> {
-    asked.or_else(|| Format::from_path(path)).ok_or_else(|| {
-        refuse(path, "the name says no format to write", "give it a name that ends in .stl, .ply, .obj or .off")
+pub(crate) fn format(path: &Path, asked: Option<GoalFormat>) -> Result<GoalFormat> {
+    let octree = || OctreeFormat::from_path(path).map(GoalFormat::Octree);
+    asked.or_else(octree).or_else(|| Format::from_path(path).map(GoalFormat::Mesh)).ok_or_else(|| {
+        refuse(
+            path,
+            "the name says no format to write",
+            "give it a name that ends in one that `zmend help repair` lists",
+        )
     })
+}
+
+/// The format of a mesh to write, as the name says.
+pub(crate) fn mesh_format(path: &Path) -> Result<Format> {
+    match format(path, None)? {
+        GoalFormat::Mesh(format) => Ok(format),
+        GoalFormat::Octree(_) => Err(refuse(path, "a mesh is no octree", "repair it to make one of it")),
+    }
 }

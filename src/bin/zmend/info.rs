@@ -42,7 +42,7 @@ fn as_json(info: &InputInfo, measured: Measured) -> String {
 
 fn as_text(info: &InputInfo, measured: Measured) -> String {
     let name = info.path.display();
-    let welded = if info.format == Format::Stl { ", welded" } else { "" };
+    let welded = if matches!(info.format, Format::Stl | Format::Gltf | Format::Glb) { ", welded" } else { "" };
     let mut text = format!("{name}: {} ({}){welded}\n", info.format, info.encoding);
     let verdict = measured.verdict();
     let remedy = measured.report.faces > 0 && !measured.is_solid();

@@ -7,6 +7,7 @@ mod goal;
 mod info;
 mod json;
 mod measure;
+mod octree;
 mod print;
 mod render;
 mod repair;
@@ -15,12 +16,11 @@ mod summary;
 mod units;
 
 use args::{Args, Command};
-use clap::Parser;
 use std::process::ExitCode;
 use zmend::{Error, Result};
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = args::parse();
     match run(&args) {
         Ok(code) => code,
         Err(error) => {

@@ -2,18 +2,19 @@
 
 use crate::args::{RepairArgs, ReportArg};
 use crate::bars::Bars;
+use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
 use crate::summary::Summary;
-use crate::{digits, goal};
+use crate::{digits, goal, octree};
 use glam::DVec3;
 use std::iter;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use zmend::io::{self, Format, Input, WriteOptions};
+use zmend::io::{self, Input, OctreeFormat, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
-use zmend::{Faces, Options, RepairReport, Result, repair_into};
+use zmend::{Faces, Options, Result, repair_into};
 
 /// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
 const SMALL: u64 = 1_000_000;
@@ -22,14 +23,16 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let goal = args.goal();
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[&args.input], args.write.force)?;
-    let options = Options {
-        depth: args.grid.depth,
-        scale: args.grid.scale,
-        surface: args.surface.kind.into(),
-        // STL has nothing else, and the surface knows better than the writer which diagonals to take.
-        faces: if format == Format::Stl { Faces::Triangles } else { args.surface.faces.into() },
-        no_self_intersections: args.surface.no_self_intersections,
+    let from = OctreeFormat::of_file(&args.input)?;
+    let format = match (from, format) {
+        (None, GoalFormat::Mesh(format)) => format,
+        _ => return octree::run(args, from, format),
     };
+    let mut options = options(args);
+    if format.has_only_triangles() {
+        // The surface knows better than the writer which diagonals to take.
+        options.faces = Faces::Triangles;
+    }
 
     let bars = Bars::new(!args.tell.quiet && !args.tell.json);
     let start = Instant::now();
@@ -53,7 +56,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let peak_memory = peak_memory();
     bars.start("measure", 0);
     let before = before(&input.input, args.tell.report)?;
-    let after = after(&report, goal, bytes, args.tell.report)?;
+    let after = after(report.sizes, report.volume, goal, bytes, args.tell.report)?;
     drop(bars);
     // The reading was done before the repair asked for it.
     let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read).map(|&(s, time)| (s.name(), time));
@@ -78,14 +81,25 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     told.map(|()| ExitCode::SUCCESS)
 }
 
+/// What is asked for.
+pub(crate) fn options(args: &RepairArgs) -> Options {
+    Options {
+        depth: args.grid.depth,
+        scale: args.grid.scale,
+        surface: args.surface.kind.into(),
+        faces: args.surface.faces.into(),
+        no_self_intersections: args.surface.no_self_intersections,
+    }
+}
+
 /// An input whose bounds are found once, although both the precision of the output and the repair depend on them.
-struct Bounded {
+pub(crate) struct Bounded {
     input: Input,
     bounds: Bounds,
 }
 
 impl Bounded {
-    fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let mut input = io::open(path)?;
         let bounds = input.bounds()?;
         Ok(Bounded { input, bounds })
@@ -123,8 +137,9 @@ fn before(input: &Input, report: ReportArg) -> Result<Side> {
     Ok(Side::new(info, measured.then(|| Measured::input(input)).transpose()?))
 }
 
-fn after(report: &RepairReport, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
-    let MeshSizes { points, faces, corners } = report.sizes;
+/// What is known of the written surface, given its size and the volume that it encloses.
+pub(crate) fn after(sizes: MeshSizes, volume: f64, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
+    let MeshSizes { points, faces, corners } = sizes;
     let is_known = goal.is_file() && is_measured(faces, asked);
     Ok(Side {
         bytes: Some(bytes),
@@ -132,13 +147,13 @@ fn after(report: &RepairReport, goal: &Path, bytes: u64, asked: ReportArg) -> Re
         faces,
         // Closed and manifold by construction: every edge has two corners.
         euler: Some(points as i64 - (corners / 2) as i64 + faces as i64),
-        volume: Some(report.volume),
+        volume: Some(volume),
         measured: is_known.then(|| Measured::file(goal)).transpose()?,
     })
 }
 
 /// The most memory that this process has held at once, where the system tells.
-fn peak_memory() -> Option<u64> {
+pub(crate) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -10,7 +10,7 @@ use zmend::mesh::sample;
 pub(crate) fn run(args: &SampleArgs) -> Result<ExitCode> {
     match (&args.name, &args.out) {
         (Some(name), Some(out)) if !args.list => {
-            goal::format(out, None)?;
+            goal::mesh_format(out)?;
             goal::check(out, &[], args.force)?;
             let mesh = sample::build(name, args.detail)?;
             let bytes = io::write(out, &mesh, WriteOptions::default())?;

@@ -121,7 +121,7 @@ impl Summary<'_> {
             warnings.push(format!("{ignored} behind the end of the input's mesh were ignored"));
         }
         if self.loses_digits {
-            let problem = "binary STL files hold 7 digits, too few for cells so small so far from the origin";
+            let problem = "files of this format hold 7 digits, too few for cells so small so far from the origin";
             warnings.push(format!("{problem}: vertices may fall together; write PLY instead"));
         }
         if let Some(measured) = &self.after.measured
@@ -136,7 +136,7 @@ impl Summary<'_> {
     }
 }
 
-fn surface_name(surface: Surface) -> &'static str {
+pub(crate) fn surface_name(surface: Surface) -> &'static str {
     match surface {
         Surface::MarchingCubes => "mc",
         Surface::DualContouring => "dc",

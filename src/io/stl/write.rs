@@ -142,7 +142,8 @@ impl<P: Position> Encoder for StlEncoder<P> {
             out.push(b"endsolid zmend\n");
             return None;
         }
-        (self.written != self.promised).then(|| Patch { position: COUNT, bytes: (self.written as u32).to_le_bytes() })
+        (self.written != self.promised)
+            .then(|| Patch { position: COUNT, bytes: (self.written as u32).to_le_bytes().to_vec() })
     }
 }
 

@@ -5,7 +5,10 @@ mod values;
 
 pub(crate) use repair::{RepairArgs, ReportArg};
 
-use clap::{Parser, Subcommand, value_parser};
+use repair::GridArgs;
+
+use clap::parser::ValueSource;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, value_parser};
 use std::path::PathBuf;
 use values::{degrees, detail_range, size};
 
@@ -33,6 +36,19 @@ pub(crate) struct Args {
     /// Number of threads; all cores when not given. Results do not depend on it.
     #[arg(long, value_name = "N", global = true, value_parser = value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
+}
+
+/// What the command line says; ends the program when it makes no sense.
+pub(crate) fn parse() -> Args {
+    let matches = Args::command().get_matches();
+    let mut args = Args::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    if let (Command::Repair(args), Some((_, matches))) = (&mut args.command, matches.subcommand()) {
+        let is_given = |id: &&str| {
+            matches.ids().any(|known| known == id) && matches.value_source(id) == Some(ValueSource::CommandLine)
+        };
+        args.grid.given = GridArgs::IDS.into_iter().find(is_given);
+    }
+    args
 }
 
 #[derive(Debug, Subcommand)]

@@ -1,9 +1,10 @@
 //! What `zmend repair` understands.
 
 use super::values::{depth_range, scale};
+use crate::goal::GoalFormat;
 use clap::{ArgGroup, ValueEnum};
 use std::path::{Path, PathBuf};
-use zmend::io::Format;
+use zmend::io::{Format, OctreeFormat};
 
 /// Make a closed, manifold, oriented surface of any mesh.
 #[derive(Debug, clap::Args)]
@@ -16,16 +17,18 @@ Examples:
   zmend repair broken.obj -o fixed.ply --depth 9      twice as fine, four times the faces and time
   zmend repair part.stl fixed.stl --surface dc        keep sharp edges and corners
   zmend repair part.stl fixed.stl --surface dc --no-self-intersections
+  zmend repair part.stl part.sog                      the signed octree, for TopoMender and others
+  zmend repair part.sog part.ply --surface dc         the surface of an octree file
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
 )]
 pub(crate) struct RepairArgs {
-    /// Mesh to repair.
+    /// Mesh to repair, or an octree to make a surface of (.sof, .sog, .dcf), which has a grid of its own.
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
-    /// File to write: .stl, .ply, .obj or .off.
+    /// File to write: .stl, .ply, .obj, .off, .glb or .3mf; or the octree alone, as .sof, .sog or .dcf.
     #[arg(value_name = "OUT")]
     out: Option<PathBuf>,
     /// The same as OUT.
@@ -52,6 +55,14 @@ pub(crate) struct GridArgs {
     /// Part of the grid that the longest side of the model takes, above 0 and below 1.
     #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: f64,
+    /// Which of these options was given, if any was.
+    #[arg(skip)]
+    pub(crate) given: Option<&'static str>,
+}
+
+impl GridArgs {
+    /// The names of the options.
+    pub(super) const IDS: [&'static str; 2] = ["depth", "scale"];
 }
 
 /// What is extracted.
@@ -157,15 +168,26 @@ pub(crate) enum FormatArg {
     Ply,
     Obj,
     Off,
+    Glb,
+    #[value(name = "3mf")]
+    ThreeMf,
+    Sof,
+    Sog,
+    Dcf,
 }
 
-impl From<FormatArg> for Format {
+impl From<FormatArg> for GoalFormat {
     fn from(arg: FormatArg) -> Self {
         match arg {
-            FormatArg::Stl => Format::Stl,
-            FormatArg::Ply => Format::Ply,
-            FormatArg::Obj => Format::Obj,
-            FormatArg::Off => Format::Off,
+            FormatArg::Stl => GoalFormat::Mesh(Format::Stl),
+            FormatArg::Ply => GoalFormat::Mesh(Format::Ply),
+            FormatArg::Obj => GoalFormat::Mesh(Format::Obj),
+            FormatArg::Off => GoalFormat::Mesh(Format::Off),
+            FormatArg::Glb => GoalFormat::Mesh(Format::Glb),
+            FormatArg::ThreeMf => GoalFormat::Mesh(Format::ThreeMf),
+            FormatArg::Sof => GoalFormat::Octree(OctreeFormat::Sof),
+            FormatArg::Sog => GoalFormat::Octree(OctreeFormat::Sog),
+            FormatArg::Dcf => GoalFormat::Octree(OctreeFormat::Dcf),
         }
     }
 }

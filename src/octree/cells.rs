@@ -1,13 +1,13 @@
 //! The 512 cells of a brick at once, and the numbers of the crossings round them.
 
+use super::SignedOctree;
+use super::crossings::Brick;
 use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::Mask;
 use crate::grid::{Axis, Edge};
-use crate::octree::SignedOctree;
-use crate::octree::crossings::Brick;
 
 /// For each cell of a brick (named by its least corner): which of its edges are crossed, which of its corners are inside.
-pub(super) struct Cells<'a> {
+pub(crate) struct Cells<'a> {
     brick: &'a Brick,
     /// The bricks at +x, +y, +z, +x+y, +x+z, +y+z.
     plus: [&'a Brick; 6],
@@ -19,7 +19,7 @@ pub(super) struct Cells<'a> {
 
 impl<'a> Cells<'a> {
     /// Brick number `i` of the octree.
-    pub(super) fn new(octree: &'a SignedOctree, i: usize) -> Self {
+    pub(crate) fn new(octree: &'a SignedOctree, i: usize) -> Self {
         let crossings = octree.crossings();
         let brick = &crossings.bricks()[i];
         let plus = crossings.plus(brick);
@@ -48,13 +48,13 @@ impl<'a> Cells<'a> {
     }
 
     /// The cells with corners of both signs.
-    pub(super) fn mixed(&self) -> Plane {
+    pub(crate) fn mixed(&self) -> Plane {
         self.edges.iter().fold(Plane::EMPTY, |a, &b| a | b)
     }
 
     /// Those of the mixed cells that may have several sheets, or one that is not a simple disc: cells with an ambiguous face (all four
     /// edges crossed), or whose only corners of one sign are opposite to each other. All others have one sheet and one vertex.
-    pub(super) fn knotty(&self) -> Plane {
+    pub(crate) fn knotty(&self) -> Plane {
         let e = &self.edges;
         let all = |list: &[usize]| list.iter().fold(Plane::FULL, |a, &i| a & e[i]);
         let none = |list: &[usize]| !list.iter().fold(Plane::EMPTY, |a, &i| a | e[i]);
@@ -72,7 +72,7 @@ impl<'a> Cells<'a> {
 
     /// Calls `each` with every mixed cell and its corners that are inside.
     #[inline]
-    pub(super) fn for_mixed(&self, mut each: impl FnMut(Local, Mask)) {
+    pub(crate) fn for_mixed(&self, mut each: impl FnMut(Local, Mask)) {
         let mixed = self.mixed();
         for x in 0..8 {
             let mut word = mixed.0[x];
@@ -89,13 +89,9 @@ impl<'a> Cells<'a> {
         }
     }
 
-    pub(super) fn brick(&self) -> &'a Brick {
-        self.brick
-    }
-
     /// The corners of a cell that are inside.
     #[inline]
-    pub(super) fn mask(&self, cell: Local) -> Mask {
+    pub(crate) fn mask(&self, cell: Local) -> Mask {
         let [x, y, z] = cell.coords();
         let bit = 8 * y + z;
         self.corners.iter().enumerate().fold(0, |mask, (i, plane)| mask | ((plane.0[x as usize] >> bit & 1) as u8) << i)
@@ -120,18 +116,18 @@ const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
 
 /// A crossed edge as a brick sees it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Crossing {
-    pub(super) axis: Axis,
+pub(crate) struct Crossing {
+    pub(crate) axis: Axis,
     /// Its start, in cells from the least corner of the brick, 0 ..= 8 each.
-    pub(super) start: [u32; 3],
+    pub(crate) start: [u32; 3],
     /// Its place in the arrays of the octree.
-    pub(super) number: u32,
+    pub(crate) number: u32,
     /// Whether its start is inside, and so its end outside.
-    pub(super) starts_inside: bool,
+    pub(crate) starts_inside: bool,
 }
 
 /// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale.
-pub(super) struct EdgeTable<T>(Box<[T; 3 * LAYER]>);
+pub(crate) struct EdgeTable<T>(Box<[T; 3 * LAYER]>);
 
 /// Where bit b of a plane's word stands in a layer of the table.
 static AT: [u8; 64] = {
@@ -165,13 +161,13 @@ static EDGE_AT: [u16; 16] = {
 };
 
 impl<T: Copy> EdgeTable<T> {
-    pub(super) fn new(empty: T) -> Self {
+    pub(crate) fn new(empty: T) -> Self {
         EdgeTable(Box::new([empty; 3 * LAYER]))
     }
 
     /// The entries of the edges of a cell of the brick last filled in. Only crossed edges have any.
     #[inline]
-    pub(super) fn at(&self, cell: Local) -> impl Fn(Edge) -> T + '_ {
+    pub(crate) fn at(&self, cell: Local) -> impl Fn(Edge) -> T + '_ {
         let [x, y, z] = cell.coords().map(|c| c as usize);
         let entries = &self.0[x * STEP[0] + y * STEP[1] + z..];
         move |edge| entries[usize::from(EDGE_AT[edge.index() & 15])]
@@ -179,7 +175,7 @@ impl<T: Copy> EdgeTable<T> {
 
     /// Makes an entry for each crossing round the cells of a brick.
     #[inline]
-    pub(super) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Crossing) -> T) {
+    pub(crate) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Crossing) -> T) {
         const LOW_Y: u64 = 0xff;
         const LOW_Z: u64 = 0x0101_0101_0101_0101;
         let mut number = cells.brick.first;

@@ -1,0 +1,113 @@
+//! Where the surface crosses edges, as far as the file says.
+
+use super::dcf::Hermite;
+use super::decode::Divided;
+use crate::geom::Frame;
+use crate::geom::normal::NormalCode;
+use crate::grid::Axis;
+use crate::grid::brick::{Local, Plane};
+use crate::octree::StoredPoints;
+use crate::octree::crossings::{Sample, lattice_point, toward};
+use crate::octree::segments::Segments;
+use glam::DVec3;
+
+/// A crossing of which nothing is known.
+pub(super) const HALF_WAY: Sample = Sample { offset: 1 << 15, normal: 0 };
+
+/// The samples of DCF, brick by brick: 4 bytes a crossing and 8 a brick.
+#[derive(Default)]
+pub(super) struct Hermites {
+    samples: Segments<Sample, 14>,
+    /// For each brick, where its samples end.
+    ends: Vec<usize>,
+    /// Crossings without a sample.
+    pub(super) missing: u64,
+}
+
+impl Hermites {
+    /// Appends a brick, of which each leaf has the samples of its edges. The cell that starts where an edge does has the word.
+    pub(super) fn push(&mut self, brick: &Divided, leaves: &Plane, data: &[[Option<Hermite>; 12]; 512]) {
+        for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
+            for edge in plane.iter() {
+                let given = data[edge.index() as usize][4 * axis.index()].filter(|_| leaves.get(edge));
+                self.missing += u64::from(given.is_none());
+                self.samples.push(given.map_or(Sample { normal: straight(axis), ..HALF_WAY }, |h| sample(axis, h)));
+            }
+        }
+        self.ends.push(self.samples.len());
+    }
+
+    /// Pushes the samples of brick number `i`, in order.
+    pub(super) fn of_brick(&self, i: usize, samples: &mut Vec<Sample>) {
+        let start = if i == 0 { 0 } else { self.ends[i - 1] };
+        samples.extend(self.samples.range(start..self.ends[i]));
+    }
+}
+
+fn sample(axis: Axis, Hermite { offset, normal }: Hermite) -> Sample {
+    // Offsets of 1 and more are cut off at 65535.
+    Sample::new((offset * 65536.0) as u16, code(axis, DVec3::from(normal.map(f64::from))))
+}
+
+fn code(axis: Axis, normal: DVec3) -> u16 {
+    if normal == DVec3::ZERO { straight(axis) } else { NormalCode::encode(axis, normal.to_array()).0 }
+}
+
+/// A normal along the edge.
+fn straight(axis: Axis) -> u16 {
+    NormalCode::encode(axis, DVec3::AXES[axis.index()].to_array()).0
+}
+
+/// A plane whose normal is nearer than this to a right angle with an edge (as sine) crosses it nowhere in particular.
+const PARALLEL: f64 = 1e-3;
+
+/// Pushes the samples of a brick's crossings, from the points of the four cells around each: the edge is cut by the plane through their mean with
+/// the cross product of their diagonals as normal.
+pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided, samples: &mut Vec<Sample>) {
+    let origin = lattice_point(frame.depth(), brick.key);
+    let home = points.of_brick(brick.key);
+    for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
+        let others = axis.others();
+        // The bricks at 0, -u, -v and -u - v.
+        let before = |steps: [i32; 2]| {
+            let mut all = [0; 3];
+            others.iter().zip(steps).for_each(|(a, step)| all[a.index()] = step);
+            brick.key.toward(toward(all)).and_then(|key| points.of_brick(key))
+        };
+        let bricks = [home, before([-1, 0]), before([0, -1]), before([-1, -1])];
+        for edge in plane.iter() {
+            let start = edge.coords();
+            let model = frame.to_model(DVec3::from(std::array::from_fn(|a| f64::from(origin[a] + start[a]))));
+            // Counter-clockwise round the edge.
+            let around = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|back: [u32; 2]| {
+                let mut at = start;
+                let mut brick = 0;
+                for (i, axis) in others.iter().enumerate() {
+                    let a = axis.index();
+                    brick |= usize::from(at[a] < back[i]) << i;
+                    at[a] = at[a].wrapping_sub(back[i]) & 7;
+                }
+                let point = bricks[brick].and_then(|brick| brick.get(Local::new(at[0], at[1], at[2])));
+                point.map(|p| (DVec3::from(p.map(f64::from)) - model) / frame.cell_size())
+            });
+            samples.push(match around {
+                [Some(a), Some(b), Some(c), Some(d)] => cut(axis, [a, b, c, d]),
+                _ => Sample { normal: straight(axis), ..HALF_WAY },
+            });
+        }
+    }
+}
+
+/// Where the edge along `axis` from the origin meets the plane of four points.
+fn cut(axis: Axis, [a, b, c, d]: [DVec3; 4]) -> Sample {
+    let mean = 0.25 * (a + b + c + d);
+    let normal = (c - a).cross(d - b);
+    let along = normal[axis.index()];
+    let (at, normal) = if along.abs() > PARALLEL * normal.length() {
+        (mean.dot(normal) / along, code(axis, normal))
+    } else {
+        (mean[axis.index()], straight(axis))
+    };
+    // Numbers below 0 become 0.
+    Sample::new((at * 65536.0) as u16, normal)
+}

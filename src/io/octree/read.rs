@@ -1,0 +1,173 @@
+//! From a file to a [`SignedOctree`].
+
+use super::check::Disagreement;
+use super::dcf::Dcf;
+use super::decode::{Decoded, Divided, Keep, decode};
+use super::dialect::{Dialect, Header};
+use super::fill::{self, Hermites};
+use super::sof::Sof;
+use super::sog::Sog;
+use super::{OctreeFile, OctreeFormat, OctreeInfo};
+use crate::error::{Error, Place, Result};
+use crate::geom::Frame;
+use crate::grid::Key;
+use crate::grid::brick::Plane;
+use crate::io::bytes::Bytes;
+use crate::octree::crossings::Sample;
+use crate::octree::{SignedOctree, StoredPoints};
+use crate::progress::{Progress, Silent};
+use glam::DVec3;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Reads an octree file. The content says the format, or the name where the content does not (SOF).
+///
+/// Memory while reading: some 8 bytes a surface cell beyond what is returned.
+///
+/// # Errors
+/// When the file cannot be read, is of no known format or malformed, holds signs that contradict each other or a solid that touches the
+/// side of its cube; and `Cancelled`.
+pub fn read_octree(path: impl AsRef<Path>, progress: &dyn Progress) -> Result<OctreeFile> {
+    let path = path.as_ref();
+    let io_error = |e| Error::io(path, "read", e);
+    let mut file = File::open(path).map_err(io_error)?;
+    let metadata = file.metadata().map_err(io_error)?;
+    let name = path.display().to_string();
+    if metadata.is_file() {
+        let format = OctreeFormat::of_file(path)?;
+        return read_from(&name, file, metadata.len(), format, progress);
+    }
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(io_error)?;
+    let format = OctreeFormat::detect(&bytes, OctreeFormat::from_path(path));
+    read_from(&name, bytes.as_slice(), bytes.len() as u64, format, progress)
+}
+
+/// Reads the bytes of an octree file. `name` stands in error messages; `hint` is used where the content does not say its format.
+///
+/// # Errors
+/// As [`read_octree`].
+pub fn read_octree_bytes(name: &str, bytes: &[u8], hint: Option<OctreeFormat>) -> Result<OctreeFile> {
+    read_from(name, bytes, bytes.len() as u64, OctreeFormat::detect(bytes, hint), &Silent)
+}
+
+fn read_from(
+    name: &str,
+    reader: impl Read,
+    len: u64,
+    format: Option<OctreeFormat>,
+    progress: &dyn Progress,
+) -> Result<OctreeFile> {
+    let Some(format) = format else {
+        let problem = "neither the content nor the name says that this is an octree";
+        return Err(Error::format(name, Place::Whole, problem, "give it a name that ends in .sof, .sog or .dcf"));
+    };
+    let bytes = Bytes::new(name, reader, 0, len);
+    let info = OctreeInfo {
+        path: name.into(),
+        format,
+        bytes: len,
+        depth: 0,
+        surface_cells: 0,
+        surface_cells_inside: 0,
+        surface_cells_outside: 0,
+        empty_cells: 0,
+        missing_samples: 0,
+        trailing_bytes: 0,
+    };
+    let mut reading = Reading { name, bytes, info, progress };
+    let (octree, frame, points) = match format {
+        OctreeFormat::Sof => reading.sof()?,
+        OctreeFormat::Sog => reading.sog()?,
+        OctreeFormat::Dcf => reading.dcf()?,
+    };
+    let Reading { bytes, mut info, .. } = reading;
+    info.trailing_bytes = bytes.left();
+    Ok(OctreeFile { octree, frame, points, info })
+}
+
+/// A file that is being read.
+struct Reading<'a, R> {
+    name: &'a str,
+    bytes: Bytes<'a, R>,
+    info: OctreeInfo,
+    progress: &'a dyn Progress,
+}
+
+type Parts = (SignedOctree, Frame, Option<StoredPoints>);
+
+impl<R: Read> Reading<'_, R> {
+    fn sof(&mut self) -> Result<Parts> {
+        let (frame, decoded) = self.decoded::<Sof>(&mut |_, _, _| {})?;
+        let half_way = |_, brick: &Divided, samples: &mut Vec<Sample>| {
+            let crossings = brick.crossed().iter().map(|plane| plane.count() as usize).sum();
+            samples.resize(crossings, fill::HALF_WAY);
+        };
+        Ok((self.octree(&decoded, false, half_way)?, frame, None))
+    }
+
+    fn sog(&mut self) -> Result<Parts> {
+        let mut points = StoredPoints::default();
+        let (frame, decoded) = self.decoded::<Sog>(&mut |brick, leaves, data| {
+            let points_of_brick: Vec<[f32; 3]> = leaves.iter().map(|cell| data[cell.index() as usize]).collect();
+            points.push(brick.key, *leaves, &points_of_brick);
+        })?;
+        let octree =
+            self.octree(&decoded, true, |_, brick, samples| fill::from_points(&points, &frame, brick, samples))?;
+        Ok((octree, frame, Some(points)))
+    }
+
+    fn dcf(&mut self) -> Result<Parts> {
+        let mut hermites = Hermites::default();
+        let (frame, decoded) = self.decoded::<Dcf>(&mut |brick, leaves, data| hermites.push(brick, leaves, data))?;
+        self.info.missing_samples = hermites.missing;
+        Ok((self.octree(&decoded, true, |i, _, samples| hermites.of_brick(i, samples))?, frame, None))
+    }
+
+    /// Reads header and nodes, and makes sure that the signs make sense.
+    fn decoded<D: Dialect>(&mut self, keep: &mut Keep<'_, D::Leaf>) -> Result<(Frame, Decoded)> {
+        let header = D::read_header(&mut self.bytes)?;
+        let frame = self.frame(header)?;
+        let decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;
+        let (problem, [x, y, z], remedy) = match decoded.disagreement() {
+            None => return Ok((frame, decoded)),
+            Some(Disagreement::Around(point)) => {
+                ("cells disagree whether their common corner is inside:", point, "the file is damaged: write it again")
+            }
+            Some(Disagreement::OnSide(point)) => {
+                let remedy = "write the octree again with a margin of at least one cell on all sides";
+                ("the solid touches the side of its cube", point, remedy)
+            }
+        };
+        let problem = format!("{problem} at lattice point {x}, {y}, {z}");
+        Err(Error::format(self.name, Place::Whole, problem, remedy))
+    }
+
+    fn frame(&self, header: Header) -> Result<Frame> {
+        let (corner, side) = header.cube.unwrap_or(([0.0; 3], 1.0));
+        // Small grids are the least corner of one of 8 cells a side.
+        let depth = header.depth.max(3);
+        let side = f64::from(side) * f64::from(1u32 << (depth - header.depth));
+        let frame = Frame::new(DVec3::from(corner.map(f64::from)), side, depth);
+        frame.map_err(|e| Error::format(self.name, Place::Whole, format!("the cube of the octree: {e}"), ""))
+    }
+
+    /// Puts the octree together; `samples` pushes those of the crossings of brick number i, in order.
+    fn octree(
+        &self,
+        decoded: &Decoded,
+        with_normals: bool,
+        samples: impl Fn(usize, &Divided, &mut Vec<Sample>) + Sync,
+    ) -> Result<SignedOctree> {
+        let crossings = |brick: &Divided| brick.crossed().iter().map(|plane| u64::from(plane.count())).sum::<u64>();
+        if decoded.bricks.iter().map(crossings).sum::<u64>() > u64::from(u32::MAX) {
+            let problem = "the surface crosses more than 2^32 - 1 edges of the grid";
+            return Err(Error::format(self.name, Place::Whole, problem, "take an octree of smaller depth"));
+        }
+        let signs: Vec<(Key, Plane)> = decoded.bricks.iter().map(|brick| (brick.key, brick.corners[0])).collect();
+        let is_inside = |brick| decoded.is_uniformly_inside(brick);
+        let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| samples(i, &decoded.bricks[i], list);
+        Ok(SignedOctree::from_signs(decoded.depth, with_normals, &signs, is_inside, samples))
+    }
+}
