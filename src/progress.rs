@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// The stages of a repair, in the order in which they run.
+/// The stages of a repair, in the order in which they run, and other long work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// Reading and snapping the input; unit: bytes or points.
@@ -17,6 +17,8 @@ pub enum Stage {
     Contour,
     /// Writing the output; unit: bytes.
     Write,
+    /// Measuring distances between two surfaces; unit: points.
+    Measure,
 }
 
 impl Stage {
@@ -29,6 +31,7 @@ impl Stage {
             Stage::Sign => "sign",
             Stage::Contour => "contour",
             Stage::Write => "write",
+            Stage::Measure => "measure",
         }
     }
 }
@@ -42,6 +45,15 @@ pub trait Progress: Sync {
     /// `amount` more of the current stage's work is done.
     fn advance(&self, amount: u64) {
         let _ = amount;
+    }
+    /// A stage is going to hold so many bytes in all: the octree and what the stage needs beside it, but not source and sink. Called
+    /// before memory is taken, often while it grows.
+    ///
+    /// # Errors
+    /// When that is too much, [`Error::Memory`]; the running stage returns it.
+    fn hold(&self, bytes: u64) -> Result<()> {
+        let _ = bytes;
+        Ok(())
     }
     /// Asked often; `true` makes the running stage return [`Error::Cancelled`].
     fn is_cancelled(&self) -> bool {

@@ -107,7 +107,7 @@ fn samples_are_listed_and_written() {
     folder.run("sample cube gear.stl --force --detail 3").ok();
     assert_eq!(io::read(folder.path("gear.stl")).unwrap().faces.len(), 108);
     folder.run("sample nothing x.ply").fails(&["nothing", "knot-holes"]);
-    folder.run("sample knot x.gltf").fails(&["x.gltf", ".ply"]);
+    folder.run("sample knot x.jpeg").fails(&["x.jpeg", ".ply"]);
     folder.run("sample knot").refused(&["OUT"]);
     folder.run("sample").refused(&["NAME"]);
     folder.run("sample knot x.ply --detail 21").refused(&["detail"]);
@@ -304,7 +304,7 @@ fn errors_name_the_file_and_the_remedy() {
     folder.run("repair dir.ply out.ply").fails(&["dir.ply", "directory"]);
     folder.run("repair knot.ply dir.ply --force").fails(&["dir.ply", "directory"]);
     folder.run("repair knot.ply no/such/out.ply").fails(&["no/such/out.ply", "directory"]);
-    folder.run("repair knot.ply out.gltf").fails(&["out.gltf", ".ply"]);
+    folder.run("repair knot.ply out.jpeg").fails(&["out.jpeg", ".ply"]);
     folder.run("repair knot.ply out").fails(&["out: ", ".ply"]);
     folder.run("repair knot.ply").refused(&["OUT"]);
     folder.run("repair knot.ply a.ply -o b.ply").refused(&["cannot be used with"]);
@@ -378,6 +378,111 @@ fn pictures_are_drawn() {
     folder.run("render knot.ply b.png --size 100").refused(&["--size"]);
     folder.run("render knot.ply b.png --azimuth nan").refused(&["--azimuth"]);
     assert_eq!(folder.names(), ["a.png", "knot.ply"]);
+}
+
+#[test]
+fn octree_files_are_made_and_contoured() {
+    let folder = Folder::new();
+    for format in ["sof", "sog", "dcf"] {
+        folder.run(&format!("repair knot.ply a.{format} -d 6")).ok().says(&["on a grid of 64 cells", "surface cells"]);
+        let json = folder.run(&format!("repair a.{format} b.{format} --json")).ok().json();
+        assert_eq!((&json["input"]["depth"], &json["output"]["format"]), (&6.into(), &format.into()));
+        let (a, b) = (fs::read(folder.path(&format!("a.{format}"))), fs::read(folder.path(&format!("b.{format}"))));
+        assert_eq!(a.unwrap(), b.unwrap());
+        folder.run(&format!("info a.{format}")).ok().says(&["of 64 cells a side", "zmend repair"]);
+        let surface = if format == "sof" { "quads" } else { "dc" };
+        let ran = folder.run(&format!("repair a.{format} {format}.ply -s {surface} --report full --json")).ok();
+        assert_eq!((&ran.json()["output"]["solid"], ran.err.is_empty()), (&true.into(), format != "sof"), "{ran:?}");
+        assert_solid(&folder.path(&format!("{format}.ply")));
+    }
+    // The content says what it is, not the name; SOG files say where they lie.
+    fs::rename(folder.path("a.sog"), folder.path("a.x")).unwrap();
+    folder.run("repair a.x c.stl").ok().says(&["a solid"]);
+    let bounds = |name| io::read(folder.path(name)).unwrap().report().bounds;
+    folder.run("repair knot.ply d.stl -d 6 -q").ok();
+    assert!(bounds("c.stl").min.distance(bounds("d.stl").min) < 0.1);
+    // DCF has normals, SOF has not.
+    folder.run("repair a.dcf c.sof -q").ok();
+    folder.run("repair a.sof c.dcf").fails(&["normals", "SOF"]);
+    folder.run("repair a.sof e.ply -s dc").fails(&["surface", "mc"]);
+    folder.run("repair a.dcf e.ply -d 7").fails(&["depth", "grid of its own"]);
+    folder.run("repair a.dcf e.ply --scale 0.5").fails(&["scale"]);
+    folder.run("sample knot e.sog").fails(&["octree"]);
+    fs::write(folder.path("bad.sof"), [4, 0, 0, 0, 0, 1]).unwrap();
+    folder.run("repair bad.sof e.ply").fails(&["bad.sof", "byte 6"]);
+    assert_eq!(folder.run("info bad.sof knot.ply").code, Some(1));
+    assert!(!folder.names().iter().any(|name| name.starts_with("e.") || name.ends_with("partial")));
+}
+
+#[test]
+fn scenes_come_and_go() {
+    let folder = Folder::new();
+    for format in ["glb", "3mf"] {
+        folder.run(&format!("repair knot.ply a.{format} -d 6 -s quads")).ok().says(&["a solid"]);
+        assert_solid(&folder.path(&format!("a.{format}")));
+        folder.run(&format!("repair a.{format} {format}.ply -d 6")).ok().says(&["a solid"]);
+        let json = folder.run(&format!("info a.{format} --json")).ok().json();
+        assert_eq!((&json["format"], &json["solid"]), (&format.into(), &true.into()));
+    }
+    folder.run("repair knot.ply a.gltf").fails(&["a.gltf", ".glb"]);
+    folder.run("sample knot b.glb").ok();
+}
+
+#[test]
+fn grids_are_given_by_cells_and_boxes() {
+    let folder = Folder::new();
+    folder.add("cube.off", "cube");
+    let json = folder.run("repair cube.off a.ply --cell 0.03 --json").ok().json();
+    assert_eq!((&json["grid"]["cell_size"], &json["grid"]["cells_a_side"]), (&0.03.into(), &64.into()));
+    assert_eq!((&json["options"]["cell"], &json["options"]["depth"]), (&0.03.into(), &6.into()));
+    folder.run("repair cube.off b.ply --box -5 -5.5 -1e1 20 -d 5").ok().says(&["32 cells", "0.625 wide"]);
+    assert_solid(&folder.path("b.ply"));
+    // The same grid for two models: the same lattice planes.
+    let json = folder.run("repair cube.off c.ply --force --box -5 -5 -5 10 --cell 0.3 --json").ok().json();
+    assert_eq!(
+        (&json["grid"]["size"], &json["grid"]["origin"]),
+        (&19.2.into(), &serde_json::json!([-5.0, -5.0, -5.0]))
+    );
+    assert_eq!(json["options"]["box"]["size"], 10.0);
+    folder.run("repair cube.off d.ply --box 0.5 -5 -5 10").fails(&["box: the model", "least x", "holds it"]);
+    folder.run("repair cube.off d.ply --cell 1e-9").fails(&["cell: ", "262144", "take cells of"]);
+    for bad in
+        ["--cell 1 --depth 8", "--box 0 0 0 9 --scale 0.5", "--cell 0", "--cell -1", "--box 0 0 0", "--max-memory 0"]
+    {
+        folder.run(&format!("repair cube.off d.ply {bad}")).refused(&[bad.split_once(' ').unwrap().0]);
+    }
+    assert!(!folder.path("d.ply").exists());
+}
+
+#[test]
+fn flags_without_effect_are_told() {
+    let folder = Folder::new();
+    for (args, words) in [
+        ("a.obj --ascii", "--ascii makes no difference"),
+        ("a.stl --faces polygons -s dc", "STL has nothing but triangles"),
+        ("a.ply --faces polygons", "marching cubes makes triangles"),
+    ] {
+        let ran = folder.run(&format!("repair knot.ply {args} -d 5")).ok();
+        assert!(ran.err.contains(words), "{ran:?}");
+    }
+    let ran = folder.run("repair knot.ply b.ply --ascii --faces polygons -s quads -d 5").ok();
+    assert!(!ran.err.contains("no difference"), "{ran:?}");
+}
+
+/// Volumes beyond the range of numbers were NaN, and the file no solid although nothing was wrong with it.
+#[test]
+fn huge_coordinates_do_not_contradict_themselves() {
+    let folder = Folder::new();
+    let corners = "0 0 0\n1e200 0 0\n0 1e200 0\n0 0 1e200";
+    let simplex = format!("OFF\n4 4 0\n{corners}\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+    fs::write(folder.path("huge.off"), &simplex).unwrap();
+    let ran = folder.run("repair huge.off a.ply -d 5").ok();
+    assert!(ran.err.is_empty() && ran.out.ends_with("a solid\n"), "{ran:?}");
+    folder.run("info huge.off").ok().says(&["to 1.41421e200 long", "a solid"]);
+    fs::write(folder.path("huge.off"), simplex.replace("1e200", "1e305")).unwrap();
+    let ran = folder.run("repair huge.off b.ply -d 5");
+    assert!(ran.err.len() < 200, "{ran:?}");
+    ran.fails(&["box: a cube of 1.11111e305 units", "scale the model"]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use zmend::grid::{Extent, Key};
 use zmend::mesh::{TriangleSource, sample};
 use zmend::octree::Crossings;
 use zmend::progress::Silent;
-use zmend::sign::{Scan, scan};
+use zmend::sign::{Scan, scan, scan_oriented};
 
 /// A frame round a mesh that leaves some cells on all sides.
 fn frame_of(mesh: &Mesh, depth: u32) -> Frame {
@@ -147,4 +147,59 @@ fn plain_odd_faces(crossings: &Crossings) -> Vec<Key> {
     }
     let odd = |face: &Key| face.boundary().filter(|&edge| crossings.is_crossed(edge)).count() % 2 == 1;
     faces.into_iter().filter(odd).collect()
+}
+
+/// Everything about two lists of crossings.
+fn assert_same(name: &str, a: &Crossings, b: &Crossings) {
+    assert_eq!(a.bricks().len(), b.bricks().len(), "{name}");
+    assert!(a.bricks().iter().eq(b.bricks().iter()), "{name}: bricks");
+    assert!(a.offsets().iter().eq(b.offsets().iter()), "{name}: offsets");
+    assert!(a.normals().iter().eq(b.normals().iter()), "{name}: normals");
+}
+
+/// Whoever keeps all hits knows what the parity is.
+#[test]
+fn oriented_hits_have_the_parity_of_the_plain_scan() {
+    let mut several = 0;
+    for (name, _) in sample::names() {
+        let mesh = sample::build(name, 1).expect("a sample");
+        for (depth, with_normals) in [(5, true), (7, false)] {
+            let frame = Frame::fit(&(&mesh).bounds().expect("a sample"), depth, 0.9).expect("a frame");
+            let plain = scan(&mut &mesh, &frame, with_normals, &Silent).expect("scanned");
+            let oriented = scan_oriented(&mut &mesh, &frame, with_normals, &Silent).expect("scanned");
+            assert_eq!(oriented.hits.validate(), Ok(()), "{name}");
+            assert_eq!(oriented.hits.len() as u64, oriented.counts.hits, "{name}");
+            several += oriented.hits.len() - oriented.hits.edges().len();
+            let parity = oriented.parity(&Silent).unwrap();
+            assert_eq!(parity.counts, plain.counts, "{name}");
+            assert_same(name, &parity.crossings, &plain.crossings);
+        }
+    }
+    assert!(several > 1000, "{several} hits share an edge");
+}
+
+/// Along a line through a solid that is oriented outward, hits enter and leave in turn; through its mirror image the other way round.
+#[test]
+fn hits_know_where_faces_are_turned() {
+    let sphere = sample::build("sphere", 1).expect("a sample");
+    let reversed = sphere.faces.iter().map(|face| face.iter().rev().copied().collect::<Vec<u32>>());
+    let reversed: Vec<Vec<u32>> = reversed.collect();
+    let mirrored = Mesh { points: sphere.points.clone(), faces: reversed.iter().map(Vec::as_slice).collect() };
+    let frame = frame_of(&sphere, 6);
+    for (mesh, outward) in [(&sphere, true), (&mirrored, false)] {
+        let hits = scan_oriented(&mut &*mesh, &frame, false, &Silent).expect("scanned").hits;
+        let mut checked = 0;
+        for brick in hits.edges().bricks().iter() {
+            let origin = hits.edges().origin(brick);
+            hits.for_edges(brick, |axis, local, of_edge| {
+                let past_middle = origin[axis.index()] + local.coords()[axis.index()] >= 32;
+                let [hit] = of_edge else { panic!("a ball is thick") };
+                assert_eq!(hit.leaves == outward, past_middle, "axis {axis:?} at {:?} of {origin:?}", local.coords());
+                assert_eq!(hit.jump(), if hit.leaves { -1 } else { 1 });
+                checked += 1;
+            });
+        }
+        assert_eq!(checked, hits.len());
+        assert!(checked > 1000);
+    }
 }

@@ -36,6 +36,7 @@ pub fn marching_cubes(
     let crossings = octree.crossings();
     let bricks = crossings.bricks().len();
     progress.begin(Stage::Contour, 2 * bricks as u64);
+    progress.hold(octree.bytes() as u64)?;
     let triangles = count_triangles(octree);
     let sizes = MeshSizes { points: crossings.len() as u64, faces: triangles, corners: 3 * triangles };
     sink.begin(sizes)?;

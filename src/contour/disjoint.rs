@@ -69,7 +69,7 @@ pub(super) fn disjoint_contouring(
     progress.begin(Stage::Contour, 4 * bricks as u64);
     let (count, piece) = pieces(bricks, PIECE);
     let mut placed =
-        Placed { layout: Layout::new(octree, Style::Disjoint), positions: Segments::default(), sharp: Vec::new() };
+        Placed { layout: Layout::new(octree, Style::Disjoint)?, positions: Segments::default(), sharp: Vec::new() };
     let layout = &placed.layout;
     let (positions, sharp) = (&mut placed.positions, &mut placed.sharp);
     in_order(
@@ -85,7 +85,7 @@ pub(super) fn disjoint_contouring(
         },
     )?;
 
-    let mut cut = Cuts { cuts: Segments::default(), points: vec![0], doubled: [0; 2] };
+    let mut cut = Cuts { by_crossing: Segments::default(), points: vec![0], doubled: [0; 2] };
     let triangles = options.triangles;
     in_order(
         count,
@@ -250,7 +250,7 @@ fn cut_of(table: &CellTable<Vec4>, axis: Axis, edge: Local) -> (Cut, u32) {
 /// What becomes of all edges.
 struct Cuts {
     /// For each crossing.
-    cuts: Segments<Cut, 15>,
+    by_crossing: Segments<Cut, 15>,
     /// For each brick, the points on edges of all bricks before it; and of all bricks.
     points: Vec<u32>,
     /// Faces and their corners; twice as many as there are.
@@ -259,7 +259,7 @@ struct Cuts {
 
 impl Cuts {
     fn add(&mut self, piece: &CutPiece) {
-        self.cuts.extend_from_slice(&piece.cuts);
+        self.by_crossing.extend_from_slice(&piece.cuts);
         for points in &piece.points {
             let before = self.points[self.points.len() - 1];
             self.points.push(before.checked_add(*points).expect("fewer than 2^32 vertices"));
@@ -315,7 +315,7 @@ impl Disjoint<'_> {
             let mut place = brick.first as usize;
             for axis in Axis::ALL {
                 brick.crossed[axis.index()].iter().for_each(|edge| {
-                    if self.cut.cuts[place] & POINT != 0 {
+                    if self.cut.by_crossing[place] & POINT != 0 {
                         let along = DVec3::AXES[axis.index()] * position(crossings.offsets()[place]);
                         points.push(frame.to_model(origin + DVec3::from(edge.coords().map(f64::from)) + along));
                     }
@@ -330,7 +330,7 @@ impl Disjoint<'_> {
     fn faces(&self, triangles: bool, table: &mut CellTable<Numbered>, range: Range<usize>) -> Faces {
         let crossings = self.placed.layout.octree.crossings();
         let places = crossings.places(range.clone());
-        let mut cuts = self.cut.cuts.range(places.clone());
+        let mut cuts = self.cut.by_crossing.range(places.clone());
         let mut faces = Faces::new(triangles, places.len());
         for i in range {
             table.fill(&self.placed.layout, i, |Seen { brick, first, mask, .. }| Numbered {
@@ -404,7 +404,7 @@ impl Disjoint<'_> {
         let i = crossings.find(key).expect("crossed edges belong to listed bricks");
         let brick = &crossings.bricks()[i];
         let place = brick.place(edge.axis(), Local::new(at[0], at[1], at[2]));
-        let before = self.cut.cuts.range(brick.first as usize..place).filter(|&cut| cut & POINT != 0).count();
+        let before = self.cut.by_crossing.range(brick.first as usize..place).filter(|&cut| cut & POINT != 0).count();
         self.first_on_edges(i) + before as u32
     }
 }

@@ -12,7 +12,7 @@
 
 use super::PIECE;
 use super::disjoint::disjoint_contouring;
-use super::layout::{CellTable, Layout, Seen, Style, slot, starts};
+use super::layout::{BRICK_BYTES, CellTable, Layout, Seen, Style, slot, starts};
 use super::place::Planes;
 use crate::error::Result;
 use crate::geom::Frame;
@@ -81,7 +81,7 @@ pub struct DualOptions<'a> {
 /// Quadrilaterals begin with a corner of the diagonal by which they are best split.
 ///
 /// # Errors
-/// Whatever `sink` returns, and `Cancelled`.
+/// Whatever `sink` returns, `Cancelled`, `Memory` when `progress` says so, and when there are more than 2^32 vertices.
 ///
 /// # Panics
 /// When sharp features are asked for and the octree has no normals.
@@ -102,7 +102,8 @@ pub fn dual_contouring(
     }
     let bricks = crossings.bricks().len();
     progress.begin(Stage::Contour, 2 * bricks as u64);
-    let layout = Layout::new(octree, Style::Usual);
+    progress.hold((octree.bytes() + bricks * BRICK_BYTES) as u64)?;
+    let layout = Layout::new(octree, Style::Usual)?;
     let polygons = layout.extra_polygons();
     let (quads, extra_corners) = (crossings.len() as u64, polygons.iter().map(|p| p.1.len() as u64).sum::<u64>());
     let sizes = if options.triangles {

@@ -4,6 +4,7 @@
 //! in the plane of mixed cells, corrected for the [knots](Knot) before it: cells with several vertices or none, of which there are few and
 //! which are listed.
 
+use crate::error::{Error, Result};
 use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::{CASES, Mask};
 use crate::grid::{Axis, Corner, Key};
@@ -46,8 +47,11 @@ struct CellBrick {
     knots: u32,
 }
 
+/// The most bytes that a [`Layout`] takes for each brick while it is made, and after that.
+pub(super) const BRICK_BYTES: usize = size_of::<(Plane, Vec<Knot>)>() + size_of::<CellBrick>();
+
 impl<'a> Layout<'a> {
-    pub(super) fn new(octree: &'a SignedOctree, style: Style) -> Self {
+    pub(super) fn new(octree: &'a SignedOctree, style: Style) -> Result<Self> {
         let found: Vec<(Plane, Vec<Knot>)> = (0..octree.crossings().bricks().len())
             .into_par_iter()
             .map(|i| {
@@ -60,13 +64,18 @@ impl<'a> Layout<'a> {
         let mut layout =
             Layout { octree, style, bricks: Vec::with_capacity(found.len()), knots: Vec::new(), vertices: 0 };
         for (mixed, knots) in found {
-            let first = u32::try_from(layout.vertices).expect("fewer than 2^32 vertices");
+            let first = layout.vertices as u32;
             let extra: i64 = knots.iter().map(|&k| i64::from(layout.extra_vertices(k))).sum();
             layout.vertices += (i64::from(mixed.count()) + extra) as u64;
+            if u32::try_from(layout.vertices).is_err() {
+                let problem =
+                    format!("the surface has {} vertices or more; {} can be numbered", layout.vertices, u32::MAX);
+                return Err(Error::setting("depth", problem, "take a smaller depth"));
+            }
             layout.bricks.push(CellBrick { mixed, first, knots: layout.knots.len() as u32 });
             layout.knots.extend(knots);
         }
-        layout
+        Ok(layout)
     }
 
     /// The knots of a brick.

@@ -68,14 +68,14 @@ impl Planes {
         if placement != Placement::Centre {
             self.fill(&cells, layout.octree.crossings(), placement);
         }
+        let given = given(layout.octree, brick, placement);
         let mixed = layout.mixed(brick);
-        let origin = layout.octree.crossings().origin(&layout.octree.crossings().bricks()[brick]);
+        let origin = layout.octree.crossings().origin(cells.brick());
         let side = 1 << layout.octree.crossings().depth();
         let is_empty = |at: [i32; 3]| {
             let global: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
             layout.style == Style::Usual && global.iter().all(|&c| c < side) && !layout.is_mixed(global)
         };
-        let given = given(layout.octree, brick, placement);
         let mut creased = Plane::EMPTY;
         let mut knots = layout.knots_of(brick).iter().peekable();
         mixed.iter().for_each(|cell| {
@@ -103,9 +103,10 @@ impl Planes {
         let cells = Cells::new(octree, brick);
         self.fill(&cells, octree.crossings(), placement);
         let given = given(octree, brick, placement);
-        cells.mixed().iter().for_each(|cell| {
-            self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place);
-        });
+        cells
+            .mixed()
+            .iter()
+            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place));
     }
 
     fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
@@ -248,7 +249,7 @@ fn solve(cell: Local, placement: Placement<'_>, sum: &Qef, is_empty: &dyn Fn([i3
 fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
     let beyond = free.floor();
     let is_near = free.cmpge(low - 1.0).all() && free.cmple(high + 1.0).all();
-    if is_near && sum.flatness() < CREASED && is_empty(beyond.to_array().map(|c| c as i32)) {
+    if is_near && is_creased(Placement::SharpFeatures, sum) && is_empty(beyond.to_array().map(|c| c as i32)) {
         return free.clamp(beyond + CELL_MARGIN, beyond + (1.0 - CELL_MARGIN)).lerp(sum.mass_point(), APART);
     }
     sum.minimiser_within(low, high)

@@ -5,4 +5,4 @@ pub mod normal;
 pub mod qef;
 pub mod raster;
 
-pub use frame::Frame;
+pub use frame::{Cube, Frame};

@@ -31,13 +31,22 @@ pub type FineTriangle = [[i32; 3]; 3];
 
 /// Receives what [`rasterise`] finds.
 pub trait Hits {
-    /// The triangle's plane, with this normal (x, y, z; of any length), crosses lines along `axis` at the hits that follow.
+    /// The triangle's plane crosses lines along `axis` at the hits that follow. Its normal (x, y, z; of any length) is oriented as the
+    /// triangle is: seen from where it points to, the corners run counter-clockwise.
     fn plane(&mut self, axis: Axis, normal: [f64; 3]);
 
     /// The lattice edge that starts at lattice point `at` and runs one cell along `axis` is crossed, `offset` 65536ths of a
     /// cell from its start.
     fn hit(&mut self, axis: Axis, at: [u32; 3], offset: u16);
+
+    /// Whether no more hits are wanted: asked every [`ROWS`] rows of lattice lines, so that even the largest triangle soon ends.
+    fn is_enough(&self) -> bool {
+        false
+    }
 }
+
+/// Rows of a triangle between two looks at [`Hits::is_enough`]: some milliseconds in the finest grid, and more than a small triangle has.
+const ROWS: i64 = 16;
 
 /// Extra bits of the fixed-point depth below 1/65536 of a cell.
 const GUARD_BITS: u32 = 20;
@@ -49,13 +58,17 @@ const GUARD_BITS: u32 = 20;
 pub fn rasterise(triangle: &FineTriangle, shift: u32, hits: &mut impl Hits) {
     let mut t = *triangle;
     // Corners in a fixed order, so that the same triangle gives the same roundings however it is written.
+    let mut turned = false;
     if t[1] < t[0] {
         t.swap(0, 1);
+        turned = true;
     }
     if t[2] < t[1] {
         t.swap(1, 2);
+        turned = !turned;
         if t[1] < t[0] {
             t.swap(0, 1);
+            turned = !turned;
         }
     }
     let t = t.map(|p| p.map(i64::from));
@@ -63,9 +76,9 @@ pub fn rasterise(triangle: &FineTriangle, shift: u32, hits: &mut impl Hits) {
     let f = std::array::from_fn::<_, 3, _>(|a| t[2][a] - t[0][a]);
     let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
     // Seen along y, with u = x and v = z, the axes have the other handedness.
-    Projection::new::<1, 2, 0>(&t, n, n[0] > 0, shift).scan(Axis::X, hits);
-    Projection::new::<0, 2, 1>(&t, n, n[1] < 0, shift).scan(Axis::Y, hits);
-    Projection::new::<0, 1, 2>(&t, n, n[2] > 0, shift).scan(Axis::Z, hits);
+    Projection::new::<1, 2, 0>(&t, n, n[0] > 0, shift, turned).scan(Axis::X, hits);
+    Projection::new::<0, 2, 1>(&t, n, n[1] < 0, shift, turned).scan(Axis::Y, hits);
+    Projection::new::<0, 1, 2>(&t, n, n[2] > 0, shift, turned).scan(Axis::Z, hits);
 }
 
 /// A triangle seen along one axis: u and v are the other two axes, in order.
@@ -77,6 +90,8 @@ struct Projection {
     /// Whether the corners run counter-clockwise in the (u, v) plane.
     ccw: bool,
     shift: u32,
+    /// Whether the corners run the other way than they were given.
+    turned: bool,
 }
 
 /// A half plane of the lattice lines (column, row): inside where `start + column * du + row * dv >= 0`.
@@ -93,8 +108,9 @@ impl Projection {
         n: [i64; 3],
         ccw: bool,
         shift: u32,
+        turned: bool,
     ) -> Self {
-        Projection { corners: t.map(|p| [p[U], p[V], p[W]]), normal: [n[U], n[V], n[W]], ccw, shift }
+        Projection { corners: t.map(|p| [p[U], p[V], p[W]]), normal: [n[U], n[V], n[W]], ccw, shift, turned }
     }
 
     /// Lattice coordinates strictly after `min` and not after `max`, once the lattice has moved a little up.
@@ -125,6 +141,9 @@ impl Projection {
         // Many small triangles pass between the lines: the rest is worked out at the first hit.
         let mut plane = None;
         for row in 0..rows.1 - rows.0 {
+            if row % ROWS == ROWS - 1 && hits.is_enough() {
+                return;
+            }
             let (mut first, mut end) = (0, columns.1 - columns.0);
             for e in &edges {
                 let here = e.start + row * e.dv;
@@ -134,7 +153,7 @@ impl Projection {
                 continue;
             }
             let (depth, above) = plane.get_or_insert_with(|| {
-                let [u, v, w] = self.normal.map(|c| c as f64);
+                let [u, v, w] = self.normal.map(|c| (if self.turned { -c } else { c }) as f64);
                 let normal = match axis {
                     Axis::X => [w, u, v],
                     Axis::Y => [u, w, v],

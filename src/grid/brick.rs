@@ -7,6 +7,7 @@
 //! "The element at +x" is the plane shifted, with a carry from the neighbouring brick; a question about 512 elements is
 //! eight word operations. All methods cost a few operations per word (eight words) and allocate nothing.
 
+use super::Axis;
 use std::ops::{BitAnd, BitOr, BitXor, BitXorAssign, Not};
 
 /// Cells a side of a brick.
@@ -130,6 +131,26 @@ impl Plane {
     #[must_use]
     pub fn at_plus_z(&self, next: &Plane) -> Plane {
         Plane(std::array::from_fn(|x| (self.0[x] >> 1 & !(Z0 << 7)) | (next.0[x] & Z0) << 7))
+    }
+
+    /// The plane of the elements one step up along `axis`; `next` is the brick there. On an empty plane: the lowest layer of `next`, moved to
+    /// the highest.
+    #[must_use]
+    pub fn at_plus(&self, axis: Axis, next: &Plane) -> Plane {
+        match axis {
+            Axis::X => self.at_plus_x(next),
+            Axis::Y => self.at_plus_y(next),
+            Axis::Z => self.at_plus_z(next),
+        }
+    }
+
+    /// Whether a bit at the low side along `axis` is set.
+    pub fn touches_min(&self, axis: Axis) -> bool {
+        match axis {
+            Axis::X => self.touches_min_x(),
+            Axis::Y => self.touches_min_y(),
+            Axis::Z => self.touches_min_z(),
+        }
     }
 
     /// The plane of the elements at -x; `previous` is the brick at -x.

@@ -6,6 +6,7 @@
 pub mod axis;
 pub mod brick;
 pub mod cases;
+pub mod flood;
 pub mod key;
 
 pub use axis::{Axis, Corner, Direction, Edge, Extent, Face};

@@ -17,6 +17,11 @@ pub enum Precision {
 
 /// Turns a mesh into the bytes of a file, piece by piece: [`begin`](Self::begin), points, faces, [`end`](Self::end).
 pub(super) trait Encoder {
+    /// Bytes held until the end for a mesh of such sizes.
+    fn bytes_for(&self, _sizes: MeshSizes) -> u64 {
+        0
+    }
+
     /// Encodes what stands before the points.
     fn begin(&mut self, sizes: MeshSizes, out: &mut Out) -> Result<()>;
 

@@ -166,6 +166,10 @@ impl Writer {
 }
 
 impl MeshSink for Writer {
+    fn bytes_for(&self, sizes: MeshSizes) -> u64 {
+        self.encoder.bytes_for(sizes)
+    }
+
     fn begin(&mut self, sizes: MeshSizes) -> Result<()> {
         self.promised = sizes;
         self.encoder.begin(sizes, &mut self.out)

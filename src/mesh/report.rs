@@ -42,7 +42,8 @@ pub struct Report {
     pub inconsistent_edges: u64,
     /// Connected pieces of the boundary: holes, as long as their rims do not touch in a point.
     pub boundary_loops: u64,
-    /// Fans beyond the first of their point, summed over all points: bow-ties count one, an apex of three cones two.
+    /// Fans beyond the first of their point, summed over all points: bow-ties count one, an apex of three cones two. Corners of faces
+    /// that never leave their point are no fans.
     pub non_manifold_vertices: u64,
     /// Connected pieces of the surface: sound faces belong together when they share an edge. A point alone connects nothing.
     pub components: u64,
@@ -101,7 +102,7 @@ impl Mesh {
     /// ```
     pub fn report(&self) -> Report {
         let points = sum_points(self);
-        let faces = sum_faces(self, points.bounds.center());
+        let faces = sum_faces(self, &points.bounds);
         let euler = points.used as i64 - points.edges as i64 + faces.sound as i64;
         let extra_fans = points.fans - points.used;
         // Every union leaves one component, or one loop, less.
@@ -199,7 +200,11 @@ mod tests {
         }
         let fans: usize = stars
             .iter()
-            .map(|(v, c)| classes(c.len(), &pairs(c.len(), &|i, j| c[i].iter().any(|p| p != v && c[j].contains(p)))))
+            .map(|(v, c)| {
+                let sideless = c.iter().filter(|ends| **ends == [*v; 2]).count();
+                let all = classes(c.len(), &pairs(c.len(), &|i, j| c[i].iter().any(|p| p != v && c[j].contains(p))));
+                (all - sideless).max(1)
+            })
             .sum();
         let is_degenerate = |f: &[u32]| f.len() < 3 || f.iter().collect::<BTreeSet<_>>().len() < f.len();
         let canonical = |f: &&[u32]| {
@@ -358,6 +363,22 @@ mod tests {
             time("stars", &|| assert_eq!(Stars::new(&mesh).len(), mesh.points.len()));
             time("report", &|| assert!(mesh.report().is_closed()));
             time("validate", &|| mesh.validate().unwrap());
+        }
+    }
+
+    /// Squares of coordinates, or their cubes, are not in the range of numbers: the volume was NaN, and edges had no length.
+    #[test]
+    fn huge_and_tiny_meshes_are_measured() {
+        let unit = super::super::sample::build("cube", 1).unwrap();
+        for (size, volume) in [(1e90, 1e270), (1e200, f64::INFINITY), (1e-90, 1e-270), (1e-200, 0.0)] {
+            let mut cube = unit.clone();
+            cube.points.iter_mut().for_each(|p| *p *= size);
+            let (report, expected) = (cube.report(), unit.report());
+            assert!((report.max_edge / (expected.max_edge * size) - 1.0).abs() < 1e-9, "{size}");
+            assert!((report.min_edge / (expected.min_edge * size) - 1.0).abs() < 1e-9, "{size}");
+            let ratio = report.volume / (expected.volume * volume);
+            assert!(report.volume == expected.volume * volume || (ratio - 1.0).abs() < 1e-9, "{size} {ratio}");
+            assert_eq!(cube.validate(), Ok(()));
         }
     }
 }

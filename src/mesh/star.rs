@@ -90,7 +90,7 @@ impl<'a> Star<'a> {
         self.sides.chunk_by(|a, b| a >> 32 == b >> 32).map(|sides| Edge { sides, corners: self.corners })
     }
 
-    /// Number of fans.
+    /// Number of fans. Corners without sides, of faces that stay at their point, are none of their own.
     pub(super) fn fans(&mut self) -> u32 {
         let links = &mut self.links;
         let root = |mut i: u32, links: &mut Vec<u32>| {
@@ -102,13 +102,14 @@ impl<'a> Star<'a> {
         };
         links.clear();
         links.extend(0..self.corners.len() as u32);
-        let mut fans = self.corners.len() as u32;
+        let sideless = self.corners.iter().filter(|c| c.prev == self.point && c.next == self.point).count();
+        let mut fans = (self.corners.len() - sideless) as u32;
         for pair in self.sides.windows(2).filter(|pair| pair[0] >> 32 == pair[1] >> 32) {
             let (a, b) = (root(pair[0] as u32 >> 1, links), root(pair[1] as u32 >> 1, links));
             links[a.max(b) as usize] = a.min(b);
             fans -= u32::from(a != b);
         }
-        fans
+        fans.max(u32::from(!self.corners.is_empty()))
     }
 }
 
@@ -172,6 +173,22 @@ mod tests {
         assert_eq!(star.edges().next().unwrap().faces().collect::<Vec<_>>(), [0, 1]);
         star.visit(&stars, 1);
         assert_eq!((star.fans(), star.corners.len()), (1, 2));
+    }
+
+    #[test]
+    fn faces_that_stay_at_a_point_are_no_fans() {
+        let faces: [&[u32]; 3] = [&[1, 1, 1], &[0, 0, 0], &[0, 2, 3]];
+        let mesh = Mesh { points: vec![DVec3::ZERO; 5], faces: faces.into_iter().collect() };
+        let stars = Stars::new(&mesh);
+        let mut star = Star::default();
+        let fans: Vec<u32> = (0..5)
+            .map(|point| {
+                star.visit(&stars, point);
+                star.fans()
+            })
+            .collect();
+        assert_eq!(fans, [1, 1, 1, 1, 0]);
+        assert_eq!(mesh.report().non_manifold_vertices, 0);
     }
 
     #[test]

@@ -84,6 +84,12 @@ pub struct MeshSizes {
 
 /// Takes a mesh piece by piece: [`begin`](Self::begin), then all points, then all faces.
 pub trait MeshSink {
+    /// Bytes that the sink is going to hold of a mesh of such sizes, buffers aside. None, unless it says otherwise.
+    fn bytes_for(&self, sizes: MeshSizes) -> u64 {
+        let _ = sizes;
+        0
+    }
+
     /// Says how much will come.
     ///
     /// # Errors
@@ -104,6 +110,11 @@ pub trait MeshSink {
 }
 
 impl MeshSink for Mesh {
+    fn bytes_for(&self, sizes: MeshSizes) -> u64 {
+        let index = size_of::<u32>() as u64;
+        sizes.points * size_of::<DVec3>() as u64 + (sizes.faces + sizes.corners) * index
+    }
+
     fn begin(&mut self, sizes: MeshSizes) -> Result<()> {
         self.points.reserve_exact(sizes.points as usize);
         self.faces.reserve_exact(sizes.faces as usize, sizes.corners as usize);

@@ -1,14 +1,16 @@
 //! The sums behind a report: over faces, and over points with the edges and faces of which they are the lowest.
 
-use super::sets::Sets;
 use super::star::{Corner, Star, Stars, repeated};
 use super::{Bounds, Mesh};
+use crate::sets::Sets;
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// A face is flat to zero area when twice its area is at most this part of its longest edge squared: far above the
 /// rounding of doubles near the origin (2e-16), far below the slimmest triangle that single precision can tell (1e-7).
 const FLAT: f64 = 1e-12;
+/// Lengths whose sixth powers are in the range of numbers.
+const ORDINARY: std::ops::Range<f64> = 1e-45..1e45;
 /// Points or faces handled at a time. Fixed, so that sums do not depend on the number of threads.
 pub(super) const CHUNK: usize = 1 << 13;
 
@@ -52,16 +54,21 @@ impl Mesh {
     }
 }
 
-/// Adds up what faces are. Volumes are taken relative to `near`, so that they do not cancel far from the origin.
-pub(super) fn sum_faces(mesh: &Mesh, near: DVec3) -> Faces {
+/// Adds up what faces are. `bounds` are those of the used points. Volumes are taken relative to their middle, so that they do not
+/// cancel far from the origin, and sums are made in a unit in which no square or cube leaves the range of numbers.
+pub(super) fn sum_faces(mesh: &Mesh, bounds: &Bounds) -> Faces {
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let unit = if bounds.is_empty() || ORDINARY.contains(&largest) { 1.0 } else { largest };
+    let scale = |p: DVec3| p / unit;
+    let near = Bounds { min: scale(bounds.min), max: scale(bounds.max) }.center();
     let in_chunk = |chunk: usize| {
         let mut sums = Faces::default();
         let faces = chunk * CHUNK..mesh.faces.len().min((chunk + 1) * CHUNK);
-        faces.for_each(|i| sums.add_face(mesh, mesh.faces.get(i), near));
+        faces.for_each(|i| sums.add_face(mesh, mesh.faces.get(i), near, scale));
         sums
     };
     let chunks: Vec<Faces> = (0..mesh.faces.len().div_ceil(CHUNK)).into_par_iter().map(in_chunk).collect();
-    chunks.into_iter().fold(Faces::default(), |a, b| Faces {
+    let sum = chunks.into_iter().fold(Faces::default(), |a, b| Faces {
         sound: a.sound + b.sound,
         triangles: a.triangles + b.triangles,
         dangling: a.dangling + b.dangling,
@@ -69,11 +76,19 @@ pub(super) fn sum_faces(mesh: &Mesh, near: DVec3) -> Faces {
         zero_area: a.zero_area + b.zero_area,
         volume: a.volume + b.volume,
         area: a.area + b.area,
-    })
+    });
+    Faces { volume: sum.volume * unit * unit * unit, area: sum.area * unit * unit, ..sum }
+}
+
+/// The length of a vector, also where its square is not in the range of numbers.
+fn length(d: DVec3) -> f64 {
+    let length = d.length();
+    let largest = d.abs().max_element();
+    if ORDINARY.contains(&length) || largest == 0.0 { length } else { largest * (d / largest).length() }
 }
 
 impl Faces {
-    fn add_face(&mut self, mesh: &Mesh, face: &[u32], near: DVec3) {
+    fn add_face(&mut self, mesh: &Mesh, face: &[u32], near: DVec3, scale: impl Fn(DVec3) -> DVec3) {
         if !mesh.is_sound(face) {
             let dangling = face.iter().any(|&i| i as usize >= mesh.points.len());
             self.dangling += u64::from(dangling);
@@ -84,7 +99,7 @@ impl Faces {
         self.sound += 1;
         self.triangles += face.len() as u64 - 2;
         self.degenerate += u64::from(degenerate);
-        let corner = |k: usize| mesh.points[face[k] as usize];
+        let corner = |k: usize| scale(mesh.points[face[k] as usize]);
         if !(0..face.len()).all(|k| corner(k).is_finite()) {
             return;
         }
@@ -184,7 +199,7 @@ impl Tally {
             let mut faces = edge.faces();
             let first = faces.next().expect("an edge has a user");
             self.surface_unions += faces.filter(|&face| surface.union(first, face)).count() as u64;
-            let length = at.distance(mesh.points[edge.other() as usize]);
+            let length = length(at - mesh.points[edge.other() as usize]);
             if length.is_finite() {
                 self.finite_edges += 1;
                 self.total_length += length;

@@ -114,7 +114,7 @@ impl Mesh {
     pub fn outward(&self) -> bool {
         let mut bounds = Bounds::EMPTY;
         self.faces.corners().iter().filter_map(|&i| self.points.get(i as usize)).for_each(|&p| bounds.add(p));
-        sum_faces(self, bounds.center()).volume >= 0.0
+        sum_faces(self, &bounds).volume >= 0.0
     }
 
     fn face_violation(&self, face: u32, corners: &[u32]) -> Option<Violation> {

@@ -89,6 +89,10 @@ impl<'a> Cells<'a> {
         }
     }
 
+    pub(crate) fn brick(&self) -> &'a Brick {
+        self.brick
+    }
+
     /// The corners of a cell that are inside.
     #[inline]
     pub(crate) fn mask(&self, cell: Local) -> Mask {

@@ -19,9 +19,11 @@
 
 use super::LinearOctree;
 use super::segments::Segments;
+use crate::error::{Error, Result};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::key::SIDE;
 use crate::grid::{Axis, Direction, Extent, Key};
+use crate::progress::{Progress, Silent, check};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -134,6 +136,18 @@ pub fn lattice_point(depth: u32, element: Key) -> [u32; 3] {
     element.min_corner().map(|c| c / (SIDE >> depth))
 }
 
+/// Whether so many crossings can be numbered: places in the arrays have 32 bits.
+///
+/// # Errors
+/// When there are 2^32 or more.
+pub fn check_count(crossings: u64) -> Result<()> {
+    if u32::try_from(crossings).is_ok() {
+        return Ok(());
+    }
+    let problem = format!("the surface crosses {crossings} edges of the grid or more; {} can be numbered", u32::MAX);
+    Err(Error::setting("depth", problem, "take a smaller depth"))
+}
+
 impl Crossings {
     /// log2 of the number of cells a side.
     pub fn depth(&self) -> u32 {
@@ -170,6 +184,11 @@ impl Crossings {
         &self.normals
     }
 
+    /// Bricks, offsets and normals, taken apart.
+    pub(super) fn into_parts(self) -> (Bricks, Codes, Codes) {
+        (self.bricks, self.offsets, self.normals)
+    }
+
     /// The places in the arrays of the crossings of some bricks.
     pub fn places(&self, bricks: Range<usize>) -> Range<usize> {
         let first = |i| if i < self.bricks.len() { self.bricks[i].first as usize } else { self.len() };
@@ -200,6 +219,13 @@ impl Crossings {
         brick.plus.map(|place| if place == NO_BRICK { &NOTHING } else { &self.bricks[place as usize] })
     }
 
+    /// The places of the bricks at +x, +y, +z of a brick.
+    #[inline]
+    pub fn plus_places(&self, brick: &Brick) -> [Option<usize>; 3] {
+        let [x, y, z, ..] = brick.plus;
+        [x, y, z].map(|place| (place != NO_BRICK).then_some(place as usize))
+    }
+
     /// The lattice point at which a brick starts, in cells.
     pub fn origin(&self, brick: &Brick) -> [u32; 3] {
         lattice_point(self.depth, brick.key)
@@ -225,7 +251,7 @@ impl Crossings {
     }
 
     /// The sample at a place of the arrays.
-    fn sample_at(&self, place: usize) -> Sample {
+    pub(crate) fn sample_at(&self, place: usize) -> Sample {
         Sample { offset: self.offsets[place], normal: if self.with_normals { self.normals[place] } else { 0 } }
     }
 
@@ -238,16 +264,27 @@ impl Crossings {
         odd
     }
 
-    fn odd_faces_of(&self, brick: &Brick) -> Vec<Key> {
+    /// How many [odd faces](Self::odd_faces) there are, without a list of them.
+    pub fn count_odd_faces(&self) -> u64 {
+        let of_brick = |i| self.odd_planes(&self.bricks[i]).iter().map(|plane| u64::from(plane.count())).sum::<u64>();
+        (0..self.bricks.len()).into_par_iter().map(of_brick).sum()
+    }
+
+    /// The odd faces of a brick, by their normals.
+    fn odd_planes(&self, brick: &Brick) -> [Plane; 3] {
         let [x, y, z] = &brick.crossed;
         let [nx, ny, nz, ..] = self.plus(brick).map(|b| &b.crossed);
-        let across = [
+        [
             *y ^ y.at_plus_z(&nz[1]) ^ *z ^ z.at_plus_y(&ny[2]),
             *x ^ x.at_plus_z(&nz[0]) ^ *z ^ z.at_plus_x(&nx[2]),
             *x ^ x.at_plus_y(&ny[0]) ^ *y ^ y.at_plus_x(&nx[1]),
-        ];
+        ]
+    }
+
+    fn odd_faces_of(&self, brick: &Brick) -> Vec<Key> {
+        let planes = self.odd_planes(brick);
         let mut odd = Vec::new();
-        for (axis, plane) in Axis::ALL.into_iter().zip(&across).filter(|(_, plane)| !plane.is_empty()) {
+        for (axis, plane) in Axis::ALL.into_iter().zip(&planes).filter(|(_, plane)| !plane.is_empty()) {
             let origin = self.origin(brick);
             odd.extend(plane.iter().map(|local| {
                 let c = local.coords();
@@ -260,37 +297,102 @@ impl Crossings {
 
     /// Switches edges. An edge that is listed several times is switched as often; of the samples offered for an edge that is on
     /// at last, the least is taken. Cost: linear in crossings and toggles if there is any toggle.
+    ///
+    /// # Panics
+    /// Beyond 2^32 crossings.
     #[must_use]
-    pub fn toggled(self, mut toggles: Vec<Toggle>) -> Crossings {
+    pub fn toggled(self, toggles: Vec<Toggle>) -> Crossings {
+        self.toggled_within(toggles, &Silent).expect("fewer than 2^32 crossings, as documented")
+    }
+
+    /// The same within the memory that `progress` grants. The old crossings are given back while the new ones are made.
+    ///
+    /// # Errors
+    /// When there would be 2^32 crossings or more, `Cancelled`, and whatever [`Progress::hold`] returns.
+    pub fn toggled_within(self, mut toggles: Vec<Toggle>, progress: &dyn Progress) -> Result<Crossings> {
         if toggles.is_empty() {
-            return self;
+            return Ok(self);
         }
+        check_count(self.len() as u64 + toggles.len() as u64)?;
         toggles.par_sort_unstable();
-        let mut by_brick: Vec<(Key, Vec<Toggle>)> = Vec::new();
-        for same in toggles.chunk_by(|a, b| a.edge == b.edge).filter(|same| same.len() % 2 == 1) {
-            let at = lattice_point(self.depth, same[0].edge);
-            let key = Key::cell(self.depth - 3, at.map(|c| c >> 3)).expect("edges lie in bricks");
-            match by_brick.last_mut() {
-                Some((last, list)) if *last == key => list.push(same[0]),
-                _ => by_brick.push((key, vec![same[0]])),
-            }
-        }
+        keep_odd(&mut toggles);
+        let toggle_bytes = toggles.capacity() * size_of::<Toggle>();
+        let Crossings { depth, index, bricks, offsets, normals, with_normals } = self;
+        drop(index);
         // Edge keys are sorted by their centres: those of a brick come together, and bricks come in order.
-        let mut builder = Builder::new(self.depth, self.with_normals);
-        let mut pending = by_brick.into_iter().peekable();
-        for brick in self.bricks.iter() {
-            while let Some((key, list)) = pending.next_if(|(key, _)| *key < brick.key) {
-                builder.push_toggled(&self, &Brick { key, ..NOTHING.clone() }, &list);
+        let home = |toggle: &Toggle| {
+            let at = lattice_point(depth, toggle.edge);
+            Key::cell(depth - 3, at.map(|c| c >> 3)).expect("edges lie in bricks")
+        };
+        let mut pending = toggles.chunk_by(|a, b| home(a) == home(b)).peekable();
+        let empty = |key| Brick { key, ..NOTHING.clone() };
+        let mut builder = Builder::new(depth, with_normals);
+        let (all_bricks, all_crossings) = (bricks.len(), offsets.len());
+        let (mut offsets, mut normals) = (offsets.into_iter(), normals.into_iter());
+        let (mut of_offsets, mut of_normals) = (Vec::new(), Vec::new());
+        for (i, brick) in bricks.into_iter().enumerate() {
+            if i % 256 == 0 {
+                check(progress)?;
+                let left = all_crossings - brick.first as usize;
+                let old = (all_bricks - i) * size_of::<Brick>() + left * if with_normals { 4 } else { 2 };
+                progress.hold((old + toggle_bytes + builder.bytes()) as u64)?;
             }
-            match pending.next_if(|(key, _)| *key == brick.key) {
-                Some((_, list)) => builder.push_toggled(&self, brick, &list),
-                None => builder.push_copy(&self, brick),
+            while let Some(list) = pending.next_if(|list| home(&list[0]) < brick.key) {
+                builder.push_toggled(&empty(home(&list[0])), [&[], &[]], list);
+            }
+            let count = brick.count() as usize;
+            of_offsets.clear();
+            of_offsets.extend(offsets.by_ref().take(count));
+            of_normals.clear();
+            of_normals.extend(normals.by_ref().take(count));
+            match pending.next_if(|list| home(&list[0]) == brick.key) {
+                Some(list) => builder.push_toggled(&brick, [&of_offsets, &of_normals], list),
+                None => builder.push(brick.key, brick.crossed, &of_offsets, &of_normals),
             }
         }
-        for (key, list) in pending {
-            builder.push_toggled(&self, &Brick { key, ..NOTHING.clone() }, &list);
+        for list in pending {
+            builder.push_toggled(&empty(home(&list[0])), [&[], &[]], list);
+        }
+        drop(toggles);
+        builder.finish_within(progress)
+    }
+
+    /// Only those crossings that `kept` names for each brick: none that is not there. Cost: linear.
+    #[must_use]
+    pub(crate) fn retained(&self, kept: impl Fn(usize) -> [Plane; 3] + Sync + Send) -> Crossings {
+        let planes: Vec<[Plane; 3]> = (0..self.bricks.len()).into_par_iter().map(kept).collect();
+        let mut builder = Builder::new(self.depth, self.with_normals);
+        let (mut offsets, mut normals) = (Vec::new(), Vec::new());
+        for (brick, kept) in self.bricks.iter().zip(planes) {
+            let mut place = brick.first as usize;
+            for (crossed, kept) in brick.crossed.iter().zip(&kept) {
+                for local in crossed.iter() {
+                    if kept.get(local) {
+                        let sample = self.sample_at(place);
+                        offsets.push(sample.offset);
+                        normals.push(sample.normal);
+                    }
+                    place += 1;
+                }
+            }
+            builder.push(brick.key, kept, &offsets, &normals);
+            offsets.clear();
+            normals.clear();
         }
         builder.finish()
+    }
+
+    /// The cells of a brick with a crossed edge: those that hold a piece of the surface.
+    pub(crate) fn mixed_cells(&self, brick: &Brick) -> Plane {
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, pxz, pyz] = self.plus(brick).map(|b| &b.crossed);
+        let x = *x | x.at_plus_y(&py[0]);
+        let next_x = pz[0] | pz[0].at_plus_y(&pyz[0]);
+        let y = *y | y.at_plus_x(&px[1]);
+        let next_y = pz[1] | pz[1].at_plus_x(&pxz[1]);
+        let z = *z | z.at_plus_x(&px[2]);
+        let next_z = py[2] | py[2].at_plus_x(&pxy[2]);
+        x | x.at_plus_z(&next_x) | y | y.at_plus_z(&next_y) | z | z.at_plus_y(&next_z)
     }
 
     /// The first broken invariant, in words. Cost: linear, a few hash probes a brick.
@@ -338,6 +440,21 @@ impl Crossings {
     }
 }
 
+/// Of sorted switches, keeps one of each edge that is switched an odd number of times: the least.
+fn keep_odd(toggles: &mut Vec<Toggle>) {
+    let mut kept = 0;
+    let mut i = 0;
+    while i < toggles.len() {
+        let same = toggles[i..].iter().take_while(|t| t.edge == toggles[i].edge).count();
+        if same % 2 == 1 {
+            toggles[kept] = toggles[i];
+            kept += 1;
+        }
+        i += same;
+    }
+    toggles.truncate(kept);
+}
+
 /// The direction with these steps, not all 0.
 pub(crate) const fn toward(steps: [i32; 3]) -> Direction {
     Direction::from_steps(steps).expect("steps of -1, 0 or 1, not all 0")
@@ -356,6 +473,9 @@ fn apron(brick: &Brick) -> impl Iterator<Item = Direction> {
     ];
     needed.into_iter().filter_map(|(steps, needed)| needed.then_some(toward(steps)))
 }
+
+/// The most bytes of the index for each brick: the number of slots is a power of two, and room is made for a quarter more bricks.
+const INDEX_BYTES: usize = 52;
 
 /// Puts [`Crossings`] together from bricks in ascending order of keys.
 #[derive(Debug)]
@@ -393,26 +513,35 @@ impl Builder {
         self.made.bricks.push(brick);
     }
 
-    fn push_copy(&mut self, from: &Crossings, brick: &Brick) {
-        let range = brick.first as usize..(brick.first + brick.count()) as usize;
-        let offsets: Vec<u16> = from.offsets.range(range.clone()).copied().collect();
-        let normals: Vec<u16> = from.normals.range(range).copied().collect();
-        self.push(brick.key, brick.crossed, &offsets, &normals);
+    /// Number of crossings so far.
+    pub fn len(&self) -> usize {
+        self.made.len()
     }
 
-    fn push_toggled(&mut self, from: &Crossings, brick: &Brick, toggles: &[Toggle]) {
+    /// Whether there are no crossings yet.
+    pub fn is_empty(&self) -> bool {
+        self.made.is_empty()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.made.bytes()
+    }
+
+    /// Appends a brick whose samples are `offsets` and `normals`, with some edges switched.
+    fn push_toggled(&mut self, brick: &Brick, [offsets, normals]: [&[u16]; 2], toggles: &[Toggle]) {
         let mut crossed = brick.crossed;
         let mut samples = Vec::new();
-        let mut place = brick.first as usize;
         for axis in Axis::ALL {
             for local in crossed[axis.index()].iter() {
-                samples.push((axis.index(), local, from.sample_at(place)));
-                place += 1;
+                let place = samples.len();
+                let sample = Sample { offset: offsets[place], normal: normals.get(place).copied().unwrap_or(0) };
+                samples.push((axis.index(), local, sample));
             }
         }
         for toggle in toggles {
             let axis = toggle.edge.dir().axes().next().expect("an edge has an axis").index();
-            let [x, y, z] = lattice_point(from.depth, toggle.edge);
+            let [x, y, z] = lattice_point(self.made.depth, toggle.edge);
             let local = Local::new(x, y, z);
             crossed[axis].toggle(local);
             if crossed[axis].get(local) {
@@ -428,7 +557,16 @@ impl Builder {
 
     /// Adds the bricks without crossings that the invariant asks for, the index and the neighbours.
     pub fn finish(self) -> Crossings {
+        self.finish_within(&Silent).expect("all that is asked for may be held")
+    }
+
+    /// The same within the memory that `progress` grants.
+    ///
+    /// # Errors
+    /// Whatever [`Progress::hold`] returns.
+    pub fn finish_within(self, progress: &dyn Progress) -> Result<Crossings> {
         let mut made = self.made;
+        progress.hold((made.bytes() + made.bricks.len() * INDEX_BYTES) as u64)?;
         made.index.reserve(made.bricks.len() + made.bricks.len() / 4);
         for (place, brick) in (0..).zip(made.bricks.iter()) {
             made.index.insert(brick.key, place);
@@ -444,6 +582,9 @@ impl Builder {
             .collect();
         missing.par_sort_unstable();
         missing.dedup();
+        // With the neighbours, which are gathered before they are entered.
+        let neighbours = (made.bricks.len() + missing.len()) * size_of::<[u32; 6]>();
+        progress.hold((made.bytes() + missing.len() * (size_of::<Brick>() + INDEX_BYTES) + neighbours) as u64)?;
         made.insert_empty(missing);
         let bricks = (0..made.bricks.len()).into_par_iter();
         let plus: Vec<[u32; 6]> = bricks
@@ -454,7 +595,7 @@ impl Builder {
             })
             .collect();
         plus.into_iter().enumerate().for_each(|(i, plus)| made.bricks[i].plus = plus);
-        made
+        Ok(made)
     }
 }
 

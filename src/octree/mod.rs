@@ -21,12 +21,16 @@
 //! ```
 
 pub(crate) mod cells;
+pub mod compact;
+pub mod components;
 pub mod crossings;
+pub mod hits;
 mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
 pub mod points;
+pub mod regions;
 pub mod segments;
 pub mod signed;
 mod traverse;
@@ -41,7 +45,9 @@ use hashbrown::hash_map::Entry;
 use crate::grid::Key;
 use crate::grid::key::MAX_LEVEL;
 
+pub use compact::CompactOctree;
 pub use crossings::Crossings;
+pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
 pub use points::{CellPoints, StoredPoints};
 pub use signed::SignedOctree;

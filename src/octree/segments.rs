@@ -60,9 +60,28 @@ impl<T, const BITS: u32> Segments<T, BITS> {
         })
     }
 
+    /// Gives back the room in the last segment that is not used.
+    pub fn shrink_to_fit(&mut self) {
+        self.segments.shrink_to_fit();
+        if let Some(last) = self.segments.last_mut() {
+            last.shrink_to_fit();
+        }
+    }
+
     /// Bytes held.
     pub fn allocated_bytes(&self) -> usize {
-        self.segments.capacity() * size_of::<Vec<T>>() + self.segments.len() * Self::SIZE * size_of::<T>()
+        let Some((last, full)) = self.segments.split_last() else { return 0 };
+        self.segments.capacity() * size_of::<Vec<T>>() + (full.len() * Self::SIZE + last.capacity()) * size_of::<T>()
+    }
+}
+
+/// The elements in order; each segment is given back as soon as it is used up.
+impl<T, const BITS: u32> IntoIterator for Segments<T, BITS> {
+    type Item = T;
+    type IntoIter = std::iter::Flatten<std::vec::IntoIter<Vec<T>>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.segments.into_iter().flatten()
     }
 }
 
@@ -113,5 +132,9 @@ mod tests {
         list[77] = 5;
         assert_eq!((list[77], list[78]), (5, 78));
         assert!(list.allocated_bytes() >= 4000);
+        let before = list.allocated_bytes();
+        list.shrink_to_fit();
+        assert!(list.allocated_bytes() < before && list.iter().eq(list.range(0..1000)));
+        assert!(list.into_iter().skip(78).eq(plain[78..].iter().copied()));
     }
 }

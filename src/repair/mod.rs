@@ -1,18 +1,25 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod hull;
+mod inside;
+mod memory;
 mod options;
 mod report;
 mod solid;
 
-pub use options::{Faces, Options, Surface};
+pub use crate::sign::{Keep, Kept, Thicken};
+pub use inside::{InsideChoice, Reason};
+pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 pub use solid::Solid;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::progress::{Progress, Silent, Stage};
-use crate::sign::{close, parity_signs, scan};
+use crate::sign::{check_gap, check_width, keep, thicken};
+use inside::{Told, tell};
+use memory::{Guard, GuardedSink};
 use report::Clock;
 
 /// A repaired mesh and how it came about.
@@ -46,21 +53,28 @@ pub fn repair(mut mesh: Mesh, options: &Options) -> Result<Repaired> {
 
 /// Repairs whatever `source` yields and passes the result to `sink` as it is made: neither mesh need be in memory.
 ///
-/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)).
+/// Memory: 8 bytes a crossed grid edge while scanning, about 7 after that (see [`Crossings`](crate::octree::Crossings)), and what the
+/// sink holds.
 ///
 /// # Errors
-/// When an option is out of range, when source or sink fail, and `Cancelled`.
+/// When an option is out of range, when the input does not fit into the given cube or needs more memory than may be taken, when source or
+/// sink fail, and `Cancelled`.
 pub fn repair_into(
     source: &mut dyn TriangleSource,
     options: &Options,
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<RepairReport> {
-    let (solid, mut report) = solidify(source, options, progress)?;
-    let mut clock = Clock::default();
-    report.sizes = clock.time(Stage::Contour, || solid.extract(options, sink, progress))?;
-    report.times.append(&mut clock.times);
-    Ok(report)
+    let begun = Begun::new(source, options, progress)?;
+    let (frame, guard) = (begun.frame, Guard::new(progress, options));
+    let report = mend(source, begun, options, &guard).and_then(|(solid, mut report)| {
+        let mut clock = Clock::default();
+        let mut guarded = GuardedSink { sink, guard: &guard };
+        report.sizes = clock.time(Stage::Contour, || solid.extract(options, &mut guarded, &guard))?;
+        report.times.append(&mut clock.times);
+        Ok(report)
+    });
+    report.map_err(|error| guard.explain(error, source, Some(sink), &frame, options))
 }
 
 /// Repairs whatever `source` yields, but extracts no surface: the solid can be written as an octree file or be extracted in several ways.
@@ -73,29 +87,62 @@ pub fn solidify(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<(Solid, RepairReport)> {
-    let mut clock = Clock::default();
-    progress.begin(Stage::Read, 0);
-    let bounds = clock.time(Stage::Read, || source.bounds())?;
+    let begun = Begun::new(source, options, progress)?;
+    let (frame, guard) = (begun.frame, Guard::new(progress, options));
+    mend(source, begun, options, &guard).map_err(|error| guard.explain(error, source, None, &frame, options))
+}
+
+/// A repair of which the extent is known.
+struct Begun {
+    bounds: Bounds,
+    frame: Frame,
+    clock: Clock,
+}
+
+impl Begun {
+    fn new(source: &mut dyn TriangleSource, options: &Options, progress: &dyn Progress) -> Result<Self> {
+        let mut clock = Clock::default();
+        progress.begin(Stage::Read, 0);
+        let bounds = clock.time(Stage::Read, || source.bounds())?;
+        let frame = options.frame(&bounds)?;
+        check(options, &frame)?;
+        Ok(Begun { bounds, frame, clock })
+    }
+}
+
+/// The stages between reading and contouring.
+fn mend(
+    source: &mut dyn TriangleSource,
+    Begun { bounds, frame, mut clock }: Begun,
+    options: &Options,
+    guard: &Guard<'_>,
+) -> Result<(Solid, RepairReport)> {
+    let progress: &dyn Progress = guard;
+    guard.check_source(source, &frame)?;
     let mut warnings = Vec::new();
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let frame = Frame::fit(&nonempty(bounds), options.depth, options.scale)?;
-    let scanned = clock.time(Stage::Scan, || scan(source, &frame, options.surface.needs_normals(), progress))?;
-    let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
-    let octree = clock.time(Stage::Sign, || {
-        progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
+    let told = match options.inside {
+        Inside::Hull => hull::tell(source, &frame, options, &mut clock, progress)?,
+        rule => tell(source, &frame, options.surface.needs_normals(), rule, &mut clock, progress)?,
+    };
+    let Told { mut octree, counts, closing, choice, clipped, vanished } = told;
+    if let Some(width) = options.thicken {
+        octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
+    }
+    let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
 
-    let counts = scanned.counts;
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
     }
     let noted = [
-        (counts.skipped_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.skipped_triangles - counts.outside_triangles, Warning::SkippedTriangles as fn(u64) -> Warning),
+        (counts.outside_triangles, Warning::OutsideTriangles),
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
+        (clipped, Warning::Clipped),
+        (if options.thicken.is_none() { percent(vanished, counts.hits) } else { 0 }, Warning::FacesVanished),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
     let report = RepairReport {
@@ -103,6 +150,9 @@ pub fn solidify(
         frame,
         scan: counts,
         closing,
+        inside: choice,
+        vanished,
+        kept,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
@@ -114,7 +164,19 @@ pub fn solidify(
     Ok((Solid { octree, frame, points: None }, report))
 }
 
-/// An input without faces gets the unit cube: all checks of options apply, and the result is empty.
-fn nonempty(bounds: Bounds) -> Bounds {
-    if bounds.is_empty() { Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE } } else { bounds }
+/// Refuses what can be told before anything is read.
+fn check(options: &Options, frame: &Frame) -> Result<()> {
+    options.keep.check()?;
+    if let Some(gap) = options.gap {
+        if options.inside != Inside::Hull {
+            return Err(Error::setting("gap", "only the hull has gaps that can be closed", "add `--inside hull`"));
+        }
+        check_gap(gap, frame)?;
+    }
+    options.thicken.map_or(Ok(()), |width| check_width(width, frame))
+}
+
+/// So many in a hundred, rounded.
+fn percent(part: u64, whole: u64) -> u64 {
+    (100 * part + whole / 2).checked_div(whole).unwrap_or(0)
 }

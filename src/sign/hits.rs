@@ -3,19 +3,28 @@
 //! Triangles come in any order, bricks want their hits together. So each thread drops the hits of its triangles into
 //! buckets, one for each block of 8 x 8 x 8 bricks (64^3 cells); later every block is sorted and resolved by itself.
 //!
-//! A hit is 8 bytes: which edge of the block (brick 9 bits, axis 2, position in the brick 9), where on the edge (16 bits)
-//! and the code of the normal (16 bits). Sorting the 64-bit words brings the hits of an edge together, edges in the order in
-//! which bricks store them. Buckets grow by chunks of 4 KB which are never moved.
+//! A hit is 8 bytes: which edge of the block (brick 9 bits, axis 2, position in the brick 9), where on the edge (16 bits),
+//! the code of the normal (16 bits) and the orientation (1 bit). Sorting the 64-bit words brings the hits of an edge together, edges in
+//! the order in which bricks store them. Buckets grow by chunks which are never moved: the first holds 64 hits, later ones twice as many
+//! as the one before, up to 4 KB. All chunks are noted in a [`Ledger`], and where they become too many, hits are dropped from then on.
 
+use crate::error::{Error, Result};
 use crate::geom::normal::NormalCode;
 use crate::geom::raster::Hits;
 use crate::grid::Axis;
+use crate::progress::{Progress, check};
 use hashbrown::HashMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Cells a side of a block.
 const BLOCK_SHIFT: u32 = 6;
-/// Hits in a chunk.
-const CHUNK: usize = 512;
+/// Hits in the first chunk of a bucket, and in its largest.
+const CHUNKS: [usize; 2] = [64, 512];
+/// Bytes of a bucket without its hits: its place in the list, which may be half empty, and in the map.
+const BUCKET: u64 = 2 * 80 + 2 * 25;
+/// Bytes of a chunk beyond its hits: its place in the list of chunks, which may be half empty, and what the allocator needs.
+const CHUNK: u64 = 2 * 24 + 16;
 
 /// One crossing of a lattice edge by a triangle, inside a known block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -24,31 +33,36 @@ pub(super) struct Hit(u64);
 impl Hit {
     /// The brick's number in the block, in Z-order.
     pub(super) fn brick(self) -> u32 {
-        (self.0 >> 43) as u32
+        (self.0 >> 44) as u32
     }
 
     /// Brick, axis and position in one number: equal for hits on the same edge.
     pub(super) fn slot(self) -> u32 {
-        (self.0 >> 32) as u32
+        (self.0 >> 33) as u32
     }
 
     /// The edge's axis: 0, 1, 2 for x, y, z.
     pub(super) fn axis(self) -> usize {
-        (self.0 >> 41) as usize & 3
+        (self.0 >> 42) as usize & 3
     }
 
     /// The edge's position in its brick.
     pub(super) fn local(self) -> u32 {
-        (self.0 >> 32) as u32 & 511
+        (self.0 >> 33) as u32 & 511
     }
 
     /// 65536ths of a cell from the edge's start.
     pub(super) fn offset(self) -> u16 {
-        (self.0 >> 16) as u16
+        (self.0 >> 17) as u16
     }
 
     pub(super) fn normal(self) -> NormalCode {
-        NormalCode(self.0 as u16)
+        NormalCode((self.0 >> 1) as u16)
+    }
+
+    /// Whether who walks along the axis goes out here, as the triangle is oriented.
+    pub(super) fn leaves(self) -> bool {
+        self.0 & 1 == 1
     }
 }
 
@@ -92,6 +106,45 @@ const fn slot_bits() -> [[u32; 64]; 3] {
     table
 }
 
+/// What the buckets of all threads hold, and whether that is too much.
+pub(super) struct Ledger<'a> {
+    bytes: AtomicU64,
+    is_enough: AtomicBool,
+    error: Mutex<Option<Error>>,
+    progress: &'a dyn Progress,
+}
+
+impl<'a> Ledger<'a> {
+    pub(super) fn new(progress: &'a dyn Progress) -> Self {
+        Ledger { bytes: AtomicU64::new(0), is_enough: AtomicBool::new(false), error: Mutex::new(None), progress }
+    }
+
+    /// Bytes noted.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
+    }
+
+    /// Notes bytes that are about to be taken; `false` if that is too much, or the caller wants to stop.
+    fn note(&self, bytes: u64) -> bool {
+        let total = self.bytes.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        let held = check(self.progress).and_then(|()| self.progress.hold(total));
+        if let Err(error) = held {
+            self.error.lock().expect("noting does not panic").get_or_insert(error);
+            self.is_enough.store(true, Ordering::Relaxed);
+        }
+        !self.is_enough()
+    }
+
+    fn is_enough(&self) -> bool {
+        self.is_enough.load(Ordering::Relaxed)
+    }
+
+    /// The reason to stop, if there is any.
+    pub(super) fn result(&self) -> Result<()> {
+        self.error.lock().expect("noting does not panic").take().map_or(Ok(()), Err)
+    }
+}
+
 /// The hits of one block, as one thread found them.
 #[derive(Debug, Default)]
 pub(super) struct Bucket {
@@ -101,11 +154,23 @@ pub(super) struct Bucket {
 
 impl Bucket {
     #[cold]
-    fn next_chunk(&mut self) {
-        let full = std::mem::replace(&mut self.open, Vec::with_capacity(CHUNK));
+    fn next_chunk(&mut self, ledger: &Ledger<'_>) {
+        let [least, most] = CHUNKS;
+        let hits = (2 * self.open.capacity()).clamp(least, most);
+        if !ledger.note((hits * size_of::<Hit>()) as u64 + CHUNK) {
+            self.open.clear();
+            return;
+        }
+        let full = std::mem::replace(&mut self.open, Vec::with_capacity(hits));
         if !full.is_empty() {
             self.full.push(full);
         }
+    }
+
+    /// Bytes held by the hits.
+    pub(super) fn bytes(&self) -> u64 {
+        let chunks = self.full.iter().chain([&self.open]);
+        chunks.map(|chunk| (chunk.capacity() * size_of::<Hit>()) as u64).sum()
     }
 
     /// Moves all hits to the end of `hits`; every chunk is freed as soon as it is copied.
@@ -120,20 +185,21 @@ impl Bucket {
 pub(super) type BlockCoords = [u32; 3];
 
 /// Sorts hits into the buckets of their blocks.
-#[derive(Debug)]
-pub(super) struct HitSorter {
+pub(super) struct HitSorter<'a> {
+    ledger: &'a Ledger<'a>,
     buckets: Vec<(BlockCoords, Bucket)>,
     by_block: HashMap<BlockCoords, usize, ahash::RandomState>,
     /// The block of the last hit, and its bucket.
     current: Option<(BlockCoords, usize)>,
-    /// Axis and normal of the triangle at work, in place.
+    /// Axis, normal and orientation of the triangle at work, in place.
     plane: u64,
     with_normals: bool,
 }
 
-impl HitSorter {
-    pub(super) fn new(with_normals: bool) -> Self {
+impl<'a> HitSorter<'a> {
+    pub(super) fn new(ledger: &'a Ledger<'a>, with_normals: bool) -> Self {
         HitSorter {
+            ledger,
             buckets: Vec::new(),
             by_block: HashMap::with_hasher(ahash::RandomState::with_seeds(1, 2, 3, 4)),
             current: None,
@@ -148,6 +214,10 @@ impl HitSorter {
 
     #[cold]
     fn turn_to(&mut self, block: BlockCoords) -> usize {
+        if !self.by_block.contains_key(&block) && !self.ledger.note(BUCKET) && !self.buckets.is_empty() {
+            // Any bucket will do for hits that are dropped.
+            return 0;
+        }
         let bucket = *self.by_block.entry(block).or_insert_with(|| {
             self.buckets.push((block, Bucket::default()));
             self.buckets.len() - 1
@@ -157,11 +227,11 @@ impl HitSorter {
     }
 }
 
-impl Hits for HitSorter {
+impl Hits for HitSorter<'_> {
     #[inline]
     fn plane(&mut self, axis: Axis, normal: [f64; 3]) {
         let code = if self.with_normals { NormalCode::encode(axis, normal) } else { NormalCode(0) };
-        self.plane = (axis.index() as u64) << 41 | u64::from(code.0);
+        self.plane = (axis.index() as u64) << 42 | u64::from(code.0) << 1 | u64::from(normal[axis.index()] > 0.0);
     }
 
     #[inline]
@@ -173,16 +243,20 @@ impl Hits for HitSorter {
         };
         let [x, y, z] = at.map(|c| c as usize & 63);
         let slot = SLOT_BITS[0][x] | SLOT_BITS[1][y] | SLOT_BITS[2][z];
-        let hit = Hit(u64::from(slot) << 32 | u64::from(offset) << 16 | self.plane);
+        let hit = Hit(u64::from(slot) << 33 | u64::from(offset) << 17 | self.plane);
         let bucket = &mut self.buckets[bucket].1;
         if bucket.open.len() == bucket.open.capacity() {
-            bucket.next_chunk();
+            bucket.next_chunk(self.ledger);
         }
         bucket.open.push(hit);
     }
+
+    fn is_enough(&self) -> bool {
+        self.ledger.is_enough()
+    }
 }
 
-/// Sorts hits by edge, then by offset and normal. Returns whether some edge has several.
+/// Sorts hits by edge, then by offset, normal and orientation. Returns whether some edge has several.
 #[inline(never)]
 pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
     const DIGIT: u32 = 10;
@@ -195,10 +269,10 @@ pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
     let digit = |h: Hit, shift: u32| (h.0 >> shift) as usize & ((1 << DIGIT) - 1);
     let mut next = [[0u32; 1 << DIGIT]; 2];
     for &h in hits.iter() {
-        next[0][digit(h, 32)] += 1;
-        next[1][digit(h, 32 + DIGIT)] += 1;
+        next[0][digit(h, 33)] += 1;
+        next[1][digit(h, 33 + DIGIT)] += 1;
     }
-    for (shift, next) in [32, 32 + DIGIT].into_iter().zip(&mut next) {
+    for (shift, next) in [33, 33 + DIGIT].into_iter().zip(&mut next) {
         let mut sum = 0;
         for n in next.iter_mut() {
             sum += std::mem::replace(n, sum);
@@ -227,10 +301,43 @@ pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::Silent;
+
+    /// Lets a million bytes be held.
+    struct Million;
+
+    impl Progress for Million {
+        fn hold(&self, bytes: u64) -> Result<()> {
+            let limit = 1_000_000;
+            if bytes <= limit { Ok(()) } else { Err(Error::Memory { needed: bytes, limit, remedy: String::new() }) }
+        }
+    }
+
+    #[test]
+    fn hits_beyond_the_limit_are_dropped() {
+        // Many in one block; one in each of many blocks.
+        for shift in [0, BLOCK_SHIFT] {
+            let ledger = Ledger::new(&Million);
+            let mut sorter = HitSorter::new(&ledger, false);
+            sorter.plane(Axis::X, [1.0, 0.0, 0.0]);
+            let mut wanted = 0;
+            while !sorter.is_enough() {
+                sorter.hit(Axis::X, [wanted << shift & 0x3_ffff, 0, 0], 5);
+                wanted += 1;
+            }
+            (0..100_000).for_each(|i| sorter.hit(Axis::X, [i << shift & 0x3_ffff, 0, 0], 5));
+            assert!(matches!(ledger.result(), Err(Error::Memory { limit: 1_000_000, .. })));
+            let buckets = sorter.into_buckets();
+            let held: u64 = buckets.iter().map(|(_, bucket)| bucket.bytes()).sum();
+            assert!((100_000..1_010_000).contains(&held), "{held}");
+            assert!(wanted > 1000 && buckets.len() <= wanted as usize);
+        }
+    }
 
     #[test]
     fn slots_are_taken_apart_again() {
-        let mut sorter = HitSorter::new(true);
+        let ledger = Ledger::new(&Silent);
+        let mut sorter = HitSorter::new(&ledger, true);
         let at = [64 + 8 * 5 + 3, 8 * 2 + 7, 128 + 8 * 7 + 1];
         sorter.plane(Axis::Y, [0.0, 2.0, 0.0]);
         sorter.hit(Axis::Y, at, 999);
@@ -241,6 +348,7 @@ mod tests {
         assert_eq!(brick_coords(hits[0].brick()), [5, 2, 7]);
         assert_eq!((hits[0].local(), hits[0].axis(), hits[0].offset()), (64 * 3 + 8 * 7 + 1, 1, 999));
         assert_eq!(hits[0].normal().decode(Axis::Y), glam::Vec3A::Y);
+        assert!(hits[0].leaves());
     }
 
     #[test]
@@ -249,7 +357,7 @@ mod tests {
         let mut hits: Vec<_> = (0..5000)
             .map(|_| {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                Hit((state >> 12) & !(0xfff << 40))
+                Hit((state >> 11) & !(0xfff << 41))
             })
             .collect();
         let mut expected = hits.clone();

@@ -16,6 +16,9 @@ use crate::grid::Key;
 use crate::octree::crossings::{Crossings, Toggle};
 use hashbrown::HashMap;
 
+/// Bytes for each edge in question: the switch, its entry in the table (two slots at worst), the cluster, its excess, four faces.
+pub(super) const BYTES: usize = 16 + 2 * 17 + 8 + 8 + 4 * 16;
+
 /// Of the switches that would merge coincident walls, those that fit to their surroundings.
 pub(super) fn worth_merging(crossings: &Crossings, mut merges: Vec<Toggle>) -> Vec<Toggle> {
     if merges.is_empty() {

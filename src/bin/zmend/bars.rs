@@ -1,5 +1,6 @@
 //! Progress on the terminal.
 
+use crate::interrupt;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -51,6 +52,10 @@ impl Progress for Bars {
 
     fn advance(&self, amount: u64) {
         self.bar.inc(amount);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        interrupt::is_asked()
     }
 }
 

@@ -49,7 +49,7 @@ fn need(bounds: &Bounds, options: &Options) -> Result<Need> {
     if bounds.is_empty() {
         return Ok(Need::Single);
     }
-    let cell = Frame::fit(bounds, options.depth, options.scale)?.cell_size();
+    let cell = options.frame(bounds)?.cell_size();
     Ok(need_at(farthest(bounds) + cell, cell))
 }
 

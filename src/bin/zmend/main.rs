@@ -2,11 +2,14 @@
 
 mod args;
 mod bars;
+mod compare;
 mod digits;
 mod goal;
 mod info;
+mod interrupt;
 mod json;
 mod measure;
+mod memory;
 mod octree;
 mod print;
 mod render;
@@ -21,8 +24,13 @@ use zmend::{Error, Result};
 
 fn main() -> ExitCode {
     let args = args::parse();
+    interrupt::listen();
     match run(&args) {
         Ok(code) => code,
+        Err(error @ Error::Cancelled) => {
+            print::error(&error);
+            ExitCode::from(interrupt::EXIT_CODE)
+        }
         Err(error) => {
             print::error(&error);
             ExitCode::FAILURE
@@ -37,6 +45,7 @@ fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Repair(args) => repair::run(args),
         Command::Info(args) => info::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Render(args) => render::run(args),
     }

@@ -1,7 +1,7 @@
 //! `zmend render`: pictures.
 
 use crate::args::RenderArgs;
-use crate::{goal, print};
+use crate::{goal, interrupt, print};
 use std::path::Path;
 use std::process::ExitCode;
 use zmend::render::{View, render};
@@ -29,7 +29,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<ExitCode> {
     for (path, _) in inputs.iter().zip(&meshes).filter(|(_, mesh)| mesh.faces.is_empty()) {
         print::warning(format_args!("{}: there are no faces to draw", path.display()));
     }
-    render(&meshes.iter().collect::<Vec<_>>(), &view).write_png(out)?;
+    let picture = render(&meshes.iter().collect::<Vec<_>>(), &view);
+    interrupt::noted(|| picture.write_png(out))?;
     print::out(&format!("{}: {width} x {height} pixels\n", out.display()))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,17 +1,17 @@
 //! `zmend repair`: the main job.
 
-use crate::args::{RepairArgs, ReportArg};
+use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
 use crate::summary::Summary;
-use crate::{digits, goal, octree};
+use crate::{digits, goal, interrupt, memory, octree};
 use glam::DVec3;
 use std::iter;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use zmend::io::{self, Input, OctreeFormat, WriteOptions};
+use zmend::io::{self, Format, Input, OctreeFormat, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
 use zmend::{Faces, Options, Result, repair_into};
@@ -24,9 +24,8 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[&args.input], args.write.force)?;
     let from = OctreeFormat::of_file(&args.input)?;
-    let format = match (from, format) {
-        (None, GoalFormat::Mesh(format)) => format,
-        _ => return octree::run(args, from, format),
+    let (None, GoalFormat::Mesh(format)) = (from, format) else {
+        return octree::run(args, from, format);
     };
     let mut options = options(args);
     if format.has_only_triangles() {
@@ -42,18 +41,21 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let (precision, loses_digits) = digits::choose(&input.bounds, &options, format, is_text)?;
     let read = start.elapsed();
     let write_options = WriteOptions { precision, is_text, ..WriteOptions::default() };
-    let mut writer = io::create(goal, format, write_options)?;
-    let report = repair_into(&mut input, &options, &mut writer, &bars)?;
-    let repaired = start.elapsed();
-    bars.begin(Stage::Write, 0);
-    let bytes = writer.finish()?;
+    options.max_memory = memory::limit(args.grid.max_memory)?;
+    let (report, repaired, bytes) = interrupt::noted(|| {
+        let mut writer = io::create(goal, format, write_options)?;
+        let report = repair_into(&mut input, &options, &mut writer, &bars)?;
+        let repaired = start.elapsed();
+        bars.begin(Stage::Write, 0);
+        Ok((report, repaired, writer.finish()?))
+    })?;
     let total = start.elapsed();
     if args.tell.quiet {
         return Ok(ExitCode::SUCCESS);
     }
 
     // Before anything is measured, which takes memory of its own.
-    let peak_memory = peak_memory();
+    let peak_memory = memory::peak();
     bars.start("measure", 0);
     let before = before(&input.input, args.tell.report)?;
     let after = after(report.sizes, report.volume, goal, bytes, args.tell.report)?;
@@ -65,6 +67,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         .chain([("write", total.saturating_sub(repaired)), ("total", total)])
         .collect();
     let summary = Summary {
+        ignored: ignored(args, format),
         input: input.input.info(),
         before,
         goal,
@@ -85,11 +88,36 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
 pub(crate) fn options(args: &RepairArgs) -> Options {
     Options {
         depth: args.grid.depth,
+        cell: args.grid.cell,
         scale: args.grid.scale,
+        cube: args.grid.cube(),
+        inside: args.inside.rule.into(),
+        gap: args.inside.gap,
+        thicken: args.inside.thicken,
+        thicken_what: args.inside.thicken_what.into(),
+        keep: args.inside.keep,
+        drop_cavities: args.inside.drop_cavities,
         surface: args.surface.kind.into(),
         faces: args.surface.faces.into(),
         no_self_intersections: args.surface.no_self_intersections,
+        max_memory: None,
     }
+}
+
+/// What was asked for and makes no difference.
+fn ignored(args: &RepairArgs, format: Format) -> Vec<String> {
+    let mut ignored = Vec::new();
+    if args.write.ascii && !matches!(format, Format::Stl | Format::Ply) {
+        ignored.push(format!("--ascii makes no difference: {format} is always text"));
+    }
+    if args.surface.faces == FacesArg::Polygons {
+        if format == Format::Stl {
+            ignored.push("--faces polygons makes no difference: STL has nothing but triangles".to_owned());
+        } else if args.surface.kind == SurfaceArg::Mc {
+            ignored.push("--faces polygons makes no difference: marching cubes makes triangles".to_owned());
+        }
+    }
+    ignored
 }
 
 /// An input whose bounds are found once, although both the precision of the output and the repair depend on them.
@@ -150,12 +178,4 @@ pub(crate) fn after(sizes: MeshSizes, volume: f64, goal: &Path, bytes: u64, aske
         volume: Some(volume),
         measured: is_known.then(|| Measured::file(goal)).transpose()?,
     })
-}
-
-/// The most memory that this process has held at once, where the system tells.
-pub(crate) fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(1024 * kibibytes)
 }

@@ -1,7 +1,7 @@
 //! `zmend sample`: built-in meshes.
 
 use crate::args::SampleArgs;
-use crate::{goal, print, units};
+use crate::{goal, interrupt, print, units};
 use std::process::ExitCode;
 use zmend::Result;
 use zmend::io::{self, WriteOptions};
@@ -13,7 +13,7 @@ pub(crate) fn run(args: &SampleArgs) -> Result<ExitCode> {
             goal::mesh_format(out)?;
             goal::check(out, &[], args.force)?;
             let mesh = sample::build(name, args.detail)?;
-            let bytes = io::write(out, &mesh, WriteOptions::default())?;
+            let bytes = interrupt::noted(|| io::write(out, &mesh, WriteOptions::default()))?;
             let (faces, bytes) = (units::count(mesh.faces.len() as u64), units::bytes(bytes));
             print::out(&format!("{}: {name}, {faces} faces, {bytes}\n", out.display()))?;
         }

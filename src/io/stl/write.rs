@@ -85,6 +85,10 @@ impl<P: Position> StlEncoder<P> {
 }
 
 impl<P: Position> Encoder for StlEncoder<P> {
+    fn bytes_for(&self, sizes: MeshSizes) -> u64 {
+        sizes.points * size_of::<P>() as u64
+    }
+
     fn begin(&mut self, sizes: MeshSizes, out: &mut Out) -> Result<()> {
         // Exact when no face has fewer than three corners; else it is corrected at the end.
         self.promised = sizes.corners.saturating_sub(2 * sizes.faces);

@@ -1,10 +1,13 @@
 //! What `zmend repair` understands.
 
-use super::values::{depth_range, scale};
+use super::values::{bytes, cell, coordinate, depth_range, keep, scale, width};
 use crate::goal::GoalFormat;
 use clap::{ArgGroup, ValueEnum};
+use glam::DVec3;
 use std::path::{Path, PathBuf};
+use zmend::geom::Cube;
 use zmend::io::{Format, OctreeFormat};
+use zmend::{Keep, Thicken};
 
 /// Make a closed, manifold, oriented surface of any mesh.
 #[derive(Debug, clap::Args)]
@@ -19,7 +22,13 @@ Examples:
   zmend repair part.stl fixed.stl --surface dc --no-self-intersections
   zmend repair part.stl part.sog                      the signed octree, for TopoMender and others
   zmend repair part.sog part.ply --surface dc         the surface of an octree file
+  zmend repair part.stl fixed.stl --cell 0.1          cells of a tenth of a unit
+  zmend repair a.stl b.stl --box -5 -5 -5 10 --depth 9          the same grid for several models
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
+  zmend repair parts.stl one.stl --inside winding     solids that overlap become one
+  zmend repair cad.stl shell.stl --inside hull --gap 0.5    the outer shell, gaps up to 0.5 units closed
+  zmend repair leaf.obj leaf.stl --thicken 0.8        open sheets become walls 0.8 units thick
+  zmend repair scan.ply body.ply --keep largest --drop-cavities    one solid and nothing within
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
@@ -38,6 +47,8 @@ pub(crate) struct RepairArgs {
     #[command(flatten)]
     pub(crate) grid: GridArgs,
     #[command(flatten)]
+    pub(crate) inside: InsideArgs,
+    #[command(flatten)]
     pub(crate) surface: SurfaceArgs,
     #[command(flatten)]
     pub(crate) write: WriteArgs,
@@ -52,17 +63,85 @@ pub(crate) struct GridArgs {
     /// Resolution: 2^N cells a side, 3 to 18.
     #[arg(short, long, value_name = "N", default_value_t = 8, value_parser = depth_range(), allow_negative_numbers = true)]
     pub(crate) depth: u32,
-    /// Part of the grid that the longest side of the model takes, above 0 and below 1.
+    /// Resolution as the side of a cell, in the units of the model, instead of --depth. Cells have exactly this size.
+    #[arg(long, value_name = "SIZE", value_parser = cell, conflicts_with = "depth", allow_negative_numbers = true)]
+    pub(crate) cell: Option<f64>,
+    /// Part of the grid that the longest side of the model takes, above 0 and below 1; with --cell, the most that it takes.
     #[arg(long, value_name = "S", default_value_t = 0.9, value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: f64,
     /// Which of these options was given, if any was.
     #[arg(skip)]
     pub(crate) given: Option<&'static str>,
+    /// Where the grid lies, instead of --scale: its least corner and its side, in the units of the model. A model that does not fit inside
+    /// is refused. With --cell the least corner stays and the side grows to a power of two of cells.
+    #[arg(
+        long = "box",
+        value_names = ["X", "Y", "Z", "SIZE"],
+        num_args = 4,
+        value_parser = coordinate,
+        conflicts_with = "scale",
+        allow_negative_numbers = true
+    )]
+    cube: Option<Vec<f64>>,
+    /// Most memory to take, such as 500M or 4G: a repair that needs more is refused, and told what depth would do. All that is free when
+    /// not given.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub(crate) max_memory: Option<u64>,
 }
 
 impl GridArgs {
-    /// The names of the options.
-    pub(super) const IDS: [&'static str; 2] = ["depth", "scale"];
+    /// The names of those that place the grid.
+    pub(super) const IDS: [&'static str; 4] = ["depth", "cell", "scale", "cube"];
+
+    /// The grid's cube, if it was given.
+    pub(crate) fn cube(&self) -> Option<Cube> {
+        let [x, y, z, size] = *self.cube.as_deref()? else { return None };
+        Some(Cube { min: DVec3::new(x, y, z), size })
+    }
+}
+
+/// What is inside.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Inside")]
+pub(crate) struct InsideArgs {
+    /// How inside is told from outside.
+    #[arg(short, long = "inside", value_name = "RULE", value_enum, default_value_t = InsideArg::Auto)]
+    pub(crate) rule: InsideArg,
+    /// With --inside hull: close gaps between faces up to this width, in model units.
+    #[arg(long, value_name = "WIDTH", value_parser = width, allow_negative_numbers = true)]
+    pub(crate) gap: Option<f64>,
+    /// Give faces that bound no solid a wall so thick, in model units; at least two cells. Without it, open sheets vanish.
+    #[arg(long, value_name = "WIDTH", value_parser = width, allow_negative_numbers = true)]
+    pub(crate) thicken: Option<f64>,
+    /// Which faces get that wall.
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = ThickenArg::Sheets, requires = "thicken")]
+    pub(crate) thicken_what: ThickenArg,
+    /// Which solids stay: all, largest, those at least so large as a part of the largest (0.1), or so many of the largest (3).
+    ///
+    /// Size is counted in grid edges that the solid's surface crosses, which is about its area.
+    #[arg(long, value_name = "WHICH", default_value = "all", value_parser = keep, allow_negative_numbers = true)]
+    pub(crate) keep: Keep,
+    /// Fill cavities: what is outside, but cannot be reached from there.
+    #[arg(long)]
+    pub(crate) drop_cavities: bool,
+}
+
+/// Faces that get a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ThickenArg {
+    /// Those that bound no solid.
+    Sheets,
+    /// All; solids grow by half the width.
+    All,
+}
+
+impl From<ThickenArg> for Thicken {
+    fn from(arg: ThickenArg) -> Self {
+        match arg {
+            ThickenArg::Sheets => Thicken::Sheets,
+            ThickenArg::All => Thicken::All,
+        }
+    }
 }
 
 /// What is extracted.
@@ -134,6 +213,30 @@ impl From<FacesArg> for zmend::Faces {
             FacesArg::Auto => zmend::Faces::Auto,
             FacesArg::Triangles => zmend::Faces::Triangles,
             FacesArg::Polygons => zmend::Faces::Polygons,
+        }
+    }
+}
+
+/// Rules of what is inside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum InsideArg {
+    /// Look at the input, take one of the others, and tell which and why.
+    Auto,
+    /// What an odd number of walls keeps from the outside. Which way faces are turned makes no difference; overlaps become holes.
+    Parity,
+    /// What the faces go round, by the way they are turned: overlaps become unions, walls inside vanish, holes close smoothly.
+    Winding,
+    /// What infinity cannot reach without passing through a face, whichever way faces are turned. See --gap.
+    Hull,
+}
+
+impl From<InsideArg> for zmend::Inside {
+    fn from(arg: InsideArg) -> Self {
+        match arg {
+            InsideArg::Auto => zmend::Inside::Auto,
+            InsideArg::Parity => zmend::Inside::Parity,
+            InsideArg::Winding => zmend::Inside::Winding,
+            InsideArg::Hull => zmend::Inside::Hull,
         }
     }
 }
