@@ -53,6 +53,7 @@
 //! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
 //! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
+//! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
 //! | [`grid`] | keys, axes, corners, bricks of bits, the 256 cases: integers only |
@@ -100,6 +101,7 @@ pub mod render;
 pub mod repair;
 mod sets;
 pub mod sign;
+pub mod topology;
 
 pub use error::{Error, Place, Result};
 /// The vectors of the public interface.

@@ -3,7 +3,7 @@
 mod common;
 
 use common::shapes::{boxed, soup, triangle, unit_cube};
-use common::{Random, check, check_repaired, together, volume, with_faces, with_points};
+use common::{Chance, check, check_repaired, together, volume, with_faces, with_points};
 use glam::{DMat3, DVec3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -211,7 +211,7 @@ fn gaps_are_closed_up_to_their_width() {
 /// Closing does not touch what a ball can roll over: convex solids stay as they are, whichever way their faces look.
 #[test]
 fn flat_and_convex_faces_stay_where_they_are() {
-    let mut random = Random::new(7);
+    let mut random = Chance(7);
     for mesh in [turned(&unit_cube()), sample::build("sphere", 1).expect("a sample")] {
         let flipped: Vec<Vec<u32>> = mesh
             .faces

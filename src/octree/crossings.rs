@@ -136,6 +136,13 @@ pub fn lattice_point(depth: u32, element: Key) -> [u32; 3] {
     element.min_corner().map(|c| c / (SIDE >> depth))
 }
 
+/// The brick that owns a finest element, which is the one that holds its start, and the element's position in it. No brick owns what
+/// starts on the root's high faces.
+pub fn owner(depth: u32, element: Key) -> (Option<Key>, Local) {
+    let at = lattice_point(depth, element);
+    (Key::cell(depth - 3, at.map(|c| c >> 3)), Local::new(at[0], at[1], at[2]))
+}
+
 /// Whether so many crossings can be numbered: places in the arrays have 32 bits.
 ///
 /// # Errors
@@ -233,9 +240,8 @@ impl Crossings {
 
     /// The brick that owns a finest element, and the element's position in it.
     fn home(&self, element: Key) -> (&Brick, Local) {
-        let at = lattice_point(self.depth, element);
-        let key = Key::cell(self.depth - 3, at.map(|c| c >> 3));
-        (self.brick_or_nothing(key), Local::new(at[0], at[1], at[2]))
+        let (key, local) = owner(self.depth, element);
+        (self.brick_or_nothing(key), local)
     }
 
     /// Whether a finest edge is crossed.

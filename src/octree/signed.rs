@@ -131,7 +131,12 @@ impl SignedOctree {
         SignedOctree::from_crossings(builder.finish())
     }
 
-    /// Crossings and signs, taken apart.
+    /// An octree of which nothing is inside.
+    pub fn empty(depth: u32) -> Self {
+        SignedOctree { crossings: Builder::new(depth, false).finish(), inside: Vec::new() }
+    }
+
+    /// Crossings and signs, as [`new`](Self::new) takes them.
     pub fn into_parts(self) -> (Crossings, Vec<Plane>) {
         (self.crossings, self.inside)
     }
@@ -144,6 +149,35 @@ impl SignedOctree {
     /// For each brick, its points that are inside.
     pub fn inside(&self) -> &[Plane] {
         &self.inside
+    }
+
+    /// The corners of the cells of brick `i` that are inside, by corner number: the sign changes along a crossed edge, so all follow from
+    /// the brick's points. Cost: some 30 ns.
+    pub fn corners(&self, i: usize) -> [Plane; 8] {
+        let brick = &self.crossings.bricks()[i];
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, ..] = self.crossings.plus(brick).map(|b| &b.crossed);
+        let c0 = self.inside[i];
+        let (c1, c2, c4) = (c0 ^ *z, c0 ^ *y, c0 ^ *x);
+        let z_at_x = z.at_plus_x(&px[2]);
+        let c3 = c2 ^ z.at_plus_y(&py[2]);
+        let (c5, c6) = (c4 ^ z_at_x, c4 ^ y.at_plus_x(&px[1]));
+        let c7 = c6 ^ z_at_x.at_plus_y(&py[2].at_plus_x(&pxy[2]));
+        debug_assert_eq!(c3, c1 ^ y.at_plus_z(&pz[1]), "no face is odd");
+        [c0, c1, c2, c3, c4, c5, c6, c7]
+    }
+
+    /// The elements of brick `i` all corners of which are inside, by extent: the part of the closed cubical complex that the brick owns.
+    /// Cost: some 40 ns.
+    pub fn elements(&self, i: usize) -> [Plane; 8] {
+        // An element stretches from its start along some axes: its corners are the subsets of its extent.
+        let mut planes = self.corners(i);
+        for bit in [1, 2, 4] {
+            for extent in (0..8).filter(|extent| extent & bit != 0) {
+                planes[extent] &= planes[extent ^ bit];
+            }
+        }
+        planes
     }
 
     /// The cells of brick `i` with corners of both signs.
