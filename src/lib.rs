@@ -40,8 +40,10 @@
 //!   [thickened](Options::thicken).
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not prevented.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
-//!   through each other here and there, mostly at creases and in walls thinner than a cell. [`Mesh::self_intersections`] finds them.
+//! - **Faces of dual contouring may intersect**, here and there, mostly at creases and in walls thinner than a cell, unless
+//!   [`no_self_intersections`](Options::no_self_intersections) is asked for. Those of marching cubes and blocks never do.
+//!   [`Mesh::self_intersections`] finds them.
+//! - **Sharp edges may have notches** where they pass through cells in which the grid sees one side of them only.
 //!
 //! # Where to find what
 //!
