@@ -8,10 +8,11 @@ pub use options::{Faces, Options, Surface};
 pub use report::{RepairReport, Warning};
 
 use crate::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::octree::SignedOctree;
+use crate::octree::signed::SIGN_BYTES;
 use crate::progress::{Progress, Silent, Stage};
 use crate::sign::{close, parity_signs, scan};
 use memory::{Guard, GuardedSink};
@@ -90,8 +91,9 @@ fn mend(
     let (crossings, closing) = clock.time(Stage::Close, || close(scanned.crossings, progress))?;
     let octree = clock.time(Stage::Sign, || {
         progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
+        progress.hold((crossings.bytes() + crossings.bricks().len() * SIGN_BYTES) as u64)?;
+        Ok::<_, Error>(parity_signs(crossings))
+    })?;
     let sizes = clock.time(Stage::Contour, || extract(&octree, &frame, options, sink, progress))?;
 
     let counts = scanned.counts;
