@@ -161,6 +161,10 @@ struct Resolved {
     freed: u64,
 }
 
+/// The part of the memory of resolved hits that is found again by the allocator; the rest lies in small pieces between hits that still
+/// wait. A cube at depth 11 has 163 MB of hits and 125 MB of crossings, and 210 MB are held when all is resolved.
+const REUSED: [u64; 2] = [3, 8];
+
 fn resolve(
     blocks: Vec<(BlockCoords, Vec<Bucket>)>,
     mut held: u64,
@@ -193,7 +197,7 @@ fn resolve(
         }
         merges.extend(block.merges);
         counts.hits += block.hits;
-        held -= block.freed;
+        held -= block.freed / REUSED[1] * REUSED[0];
         progress.hold(held + builder.bytes() as u64 + (merges.capacity() * size_of::<Toggle>()) as u64)
     };
     in_order(blocks.len(), progress, Default::default, resolve, append)?;
