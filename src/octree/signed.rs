@@ -7,6 +7,10 @@ use crate::grid::{Axis, Extent, Key};
 use crate::parallel::{in_order, pieces};
 use crate::progress::Silent;
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// Bytes a brick that [`SignedOctree::from_crossings`] takes beyond the crossings: the signs, and the bricks by row.
+pub const SIGN_BYTES: usize = size_of::<Plane>() + size_of::<(u64, u32)>();
 
 /// Crossed edges together with the signs of the lattice points.
 ///
@@ -47,21 +51,30 @@ impl SignedOctree {
             })
             .collect();
         rows.par_sort_unstable();
-        let signs: Vec<(u32, Plane)> = rows
-            .par_chunk_by(|a, b| a.0 >> 16 == b.0 >> 16)
-            .flat_map_iter(|row| {
-                let mut carry = 0;
-                row.iter().map(move |&(_, i)| {
-                    let (inside, next) = bricks[i as usize].crossed[0].prefix_parity_x(carry);
-                    carry = next;
-                    (i, inside)
-                })
-            })
-            .collect();
+        // Pieces end where rows do; few of them wait at a time.
+        let is_in_row = |i: usize| i > 0 && i < rows.len() && rows[i - 1].0 >> 16 == rows[i].0 >> 16;
+        let row_end = |from: usize| (from..).find(|&i| !is_in_row(i)).expect("the last row ends");
+        let (count, piece) = pieces(rows.len(), 1024);
+        let signs = |(): &mut (), n| {
+            let Range { start, end } = piece(n);
+            let mut carry = 0;
+            let of_rows = (row_end(start)..row_end(end)).map(|i| {
+                if !is_in_row(i) {
+                    carry = 0;
+                }
+                let place = rows[i].1 as usize;
+                let (inside, next) = bricks[place].crossed[0].prefix_parity_x(carry);
+                carry = next;
+                (place, inside)
+            });
+            of_rows.collect()
+        };
         let mut inside = vec![Plane::EMPTY; bricks.len()];
-        for (i, plane) in signs {
-            inside[i as usize] = plane;
-        }
+        let enter = |signs: Vec<(usize, Plane)>| {
+            signs.into_iter().for_each(|(place, plane)| inside[place] = plane);
+            Ok(())
+        };
+        in_order(count, &Silent, || (), signs, enter).expect("nothing fails or is cancelled");
         SignedOctree::new(crossings, inside)
     }
 
