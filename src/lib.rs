@@ -40,8 +40,10 @@
 //!   [thickened](Options::thicken).
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not prevented.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
-//!   through each other here and there, mostly at creases and in walls thinner than a cell. [`Mesh::self_intersections`] finds them.
+//! - **Faces of dual contouring may intersect**, here and there, mostly at creases and in walls thinner than a cell, unless
+//!   [`no_self_intersections`](Options::no_self_intersections) is asked for. Those of marching cubes and blocks never do.
+//!   [`Mesh::self_intersections`] finds them.
+//! - **Sharp edges may have notches** where they pass through cells in which the grid sees one side of them only.
 //!
 //! # Where to find what
 //!
@@ -51,6 +53,7 @@
 //! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
 //! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
+//! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
 //! | [`grid`] | keys, axes, corners, bricks of bits, the 256 cases: integers only |
@@ -98,6 +101,7 @@ pub mod render;
 pub mod repair;
 mod sets;
 pub mod sign;
+pub mod topology;
 
 pub use error::{Error, Place, Result};
 /// The vectors of the public interface.

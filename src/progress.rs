@@ -13,6 +13,8 @@ pub enum Stage {
     Close,
     /// Inside and outside; unit: bricks.
     Sign,
+    /// Cutting handles, filling tunnels; unit: layers of thinning, whose number is not known before.
+    Topology,
     /// Extracting the surface; unit: bricks.
     Contour,
     /// Writing the output; unit: bytes.
@@ -29,6 +31,7 @@ impl Stage {
             Stage::Scan => "scan",
             Stage::Close => "close",
             Stage::Sign => "sign",
+            Stage::Topology => "topology",
             Stage::Contour => "contour",
             Stage::Write => "write",
             Stage::Measure => "measure",

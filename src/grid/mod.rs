@@ -8,6 +8,7 @@ pub mod brick;
 pub mod cases;
 pub mod flood;
 pub mod key;
+pub mod subcomplex;
 
 pub use axis::{Axis, Corner, Direction, Edge, Extent, Face};
 pub use key::Key;

@@ -3,9 +3,9 @@
 //! # Idea
 //!
 //! Triangles are halved along the longest side of the box of their centres, again and again, until at most eight are
-//! left. Halves are equal in number (give or take one), so the tree is perfect: node `i` has the children `2i` and `2i
-//! + 1`, and which triangles are below a node follows from its number. There are no pointers, and no depth is greater
-//! than another, however the input is made.
+//! left. Halves are equal in number (give or take one), so the tree is perfect: node `i` has the children `2i` and
+//! `2i + 1`, and which triangles are below a node follows from its number. There are no pointers, and no depth is
+//! greater than another, however the input is made.
 //!
 //! # Invariants
 //!

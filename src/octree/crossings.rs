@@ -136,6 +136,13 @@ pub fn lattice_point(depth: u32, element: Key) -> [u32; 3] {
     element.min_corner().map(|c| c / (SIDE >> depth))
 }
 
+/// The brick that owns a finest element, which is the one that holds its start, and the element's position in it. No brick owns what
+/// starts on the root's high faces.
+pub fn owner(depth: u32, element: Key) -> (Option<Key>, Local) {
+    let at = lattice_point(depth, element);
+    (Key::cell(depth - 3, at.map(|c| c >> 3)), Local::new(at[0], at[1], at[2]))
+}
+
 /// Whether so many crossings can be numbered: places in the arrays have 32 bits.
 ///
 /// # Errors
@@ -233,9 +240,8 @@ impl Crossings {
 
     /// The brick that owns a finest element, and the element's position in it.
     fn home(&self, element: Key) -> (&Brick, Local) {
-        let at = lattice_point(self.depth, element);
-        let key = Key::cell(self.depth - 3, at.map(|c| c >> 3));
-        (self.brick_or_nothing(key), Local::new(at[0], at[1], at[2]))
+        let (key, local) = owner(self.depth, element);
+        (self.brick_or_nothing(key), local)
     }
 
     /// Whether a finest edge is crossed.
@@ -324,11 +330,11 @@ impl Crossings {
             let at = lattice_point(depth, toggle.edge);
             Key::cell(depth - 3, at.map(|c| c >> 3)).expect("edges lie in bricks")
         };
-        let mut pending = toggles.chunk_by(|a, b| home(a) == home(b)).peekable();
+        let mut pending = toggles.chunk_by(|a, b| home(a) == home(b)).map(|list| (home(&list[0]), list)).peekable();
         let empty = |key| Brick { key, ..NOTHING.clone() };
         let mut builder = Builder::new(depth, with_normals);
         let (all_bricks, all_crossings) = (bricks.len(), offsets.len());
-        let (mut offsets, mut normals) = (offsets.into_iter(), normals.into_iter());
+        let (mut offsets, mut normals) = (offsets.into_reader(), normals.into_reader());
         let (mut of_offsets, mut of_normals) = (Vec::new(), Vec::new());
         for (i, brick) in bricks.into_iter().enumerate() {
             if i % 256 == 0 {
@@ -337,21 +343,18 @@ impl Crossings {
                 let old = (all_bricks - i) * size_of::<Brick>() + left * if with_normals { 4 } else { 2 };
                 progress.hold((old + toggle_bytes + builder.bytes()) as u64)?;
             }
-            while let Some(list) = pending.next_if(|list| home(&list[0]) < brick.key) {
-                builder.push_toggled(&empty(home(&list[0])), [&[], &[]], list);
+            while let Some((key, list)) = pending.next_if(|(key, _)| *key < brick.key) {
+                builder.push_toggled(&empty(key), [&[], &[]], list);
             }
-            let count = brick.count() as usize;
-            of_offsets.clear();
-            of_offsets.extend(offsets.by_ref().take(count));
-            of_normals.clear();
-            of_normals.extend(normals.by_ref().take(count));
-            match pending.next_if(|list| home(&list[0]) == brick.key) {
-                Some(list) => builder.push_toggled(&brick, [&of_offsets, &of_normals], list),
+            offsets.read(brick.count() as usize, &mut of_offsets);
+            normals.read(of_offsets.len(), &mut of_normals);
+            match pending.next_if(|(key, _)| *key == brick.key) {
+                Some((_, list)) => builder.push_toggled(&brick, [&of_offsets, &of_normals], list),
                 None => builder.push(brick.key, brick.crossed, &of_offsets, &of_normals),
             }
         }
-        for list in pending {
-            builder.push_toggled(&empty(home(&list[0])), [&[], &[]], list);
+        for (key, list) in pending {
+            builder.push_toggled(&empty(key), [&[], &[]], list);
         }
         drop(toggles);
         builder.finish_within(progress)

@@ -2,10 +2,11 @@
 
 use super::options::Inside;
 use super::report::Clock;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::TriangleSource;
 use crate::octree::SignedOctree;
+use crate::octree::signed::SIGN_BYTES;
 use crate::progress::{Progress, Stage};
 use crate::sign::winding::{Circulation, Patches, WholeNumbers, circulations, winding_signs};
 use crate::sign::{Closing, OrientedScan, Scan, ScanCounts, close, parity_signs, scan, scan_oriented, vanished};
@@ -110,8 +111,9 @@ fn by_parity(scan: Scan, reason: Reason, clock: &mut Clock, progress: &dyn Progr
     let (crossings, closing) = clock.time(Stage::Close, || close(scan.crossings, progress))?;
     let octree = clock.time(Stage::Sign, || {
         progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
+        progress.hold((crossings.bytes() + crossings.bricks().len() * SIGN_BYTES) as u64)?;
+        Ok::<_, Error>(parity_signs(crossings))
+    })?;
     let choice = InsideChoice { rule: Inside::Parity, reason, reversed: false };
     let vanished = closing.vanished;
     Ok(Told { octree, counts: scan.counts, closing, choice, clipped: 0, vanished })

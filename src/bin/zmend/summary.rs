@@ -85,6 +85,7 @@ impl Summary<'_> {
                 "drop_cavities": self.options.drop_cavities,
                 "surface": surface_name(self.options.surface),
                 "faces": format!("{:?}", self.options.faces).to_lowercase(),
+                "no_self_intersections": self.options.no_self_intersections,
                 "threads": rayon::current_num_threads(),
             },
             "grid": {
