@@ -8,7 +8,7 @@
 //! A **solid** is a component of the inside, with its outer surface and those of its cavities. A **cavity** is a component of the outside other
 //! than the one that reaches infinity. A ball in a hollow ball makes two solids and one cavity.
 //!
-//! Cost: that of [`Regions`], some 3 us a brick, and about 0.5 us a brick to measure them; independent of the volume.
+//! Cost: that of [`Regions`], and some population counts a brick to measure them; independent of the volume.
 
 use super::cells::Cells;
 use super::crossings::{Brick, Builder, Crossings};

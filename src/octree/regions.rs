@@ -14,7 +14,8 @@
 //!
 //! # Cost
 //!
-//! Some 3 us a brick, in parallel, and while it lasts 64 bytes a part (most bricks have two) and 28 a brick.
+//! Per brick: a flood for each of its parts (most have two) and some six look-ups of neighbours, in parallel. While it lasts, 64 bytes a part
+//! and 28 a brick.
 
 use super::crossings::{Crossings, lattice_point};
 use crate::grid::brick::{Local, Plane};

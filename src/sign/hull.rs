@@ -13,12 +13,14 @@
 //! 2. From there it grows back by r, but not through faces: up to the faces where there are any, and into a gap as far as a ball of
 //!    radius r would sink into it. A second band, round the outside of step 1, says how far.
 //!
+//! The lattice needs room to pass: gaps wider than w are certain to let the outside in only if they are two cells wider or more.
+//!
 //! As with any closing, sharp inner corners are rounded, with radius r. Faces are touched from outside only as the ball does; what lies
 //! deeper in narrow places is inside.
 //!
 //! # Cost
 //!
-//! Some 4 us a brick without gaps. With them, that of two bands of r cells: memory and time grow with the surface times r.
+//! That of [`Regions`] without gaps. With them, that of two bands of r cells: memory and time grow with the surface times r.
 
 use super::band::Band;
 use super::thicken::{check_gap, clipped, for_crossed, sample};

@@ -75,7 +75,7 @@ impl Keep {
 
 /// Drops solids and fills cavities. Without either, nothing is done and nothing counted.
 ///
-/// Cost: some 5 us a brick for each of both.
+/// Cost: linear in bricks; that of [`Components`] for each of both.
 ///
 /// # Errors
 /// As [`Keep::check`].

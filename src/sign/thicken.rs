@@ -1,7 +1,7 @@
 //! Walls for faces that bound nothing.
 //!
 //! An open sheet encloses nothing and vanishes. Here it becomes a wall: what is within half of a width of it is added to the solid. The faces
-//! are read a second time; those that the surface already follows need no wall, and neither do those inside of it.
+//! are read again, once for their hits and once for the band; those that the surface already follows need no wall, and neither do those inside of it.
 //!
 //! Which faces vanish is told by hits: a lattice edge outside that a face hits and the surface does not cross is lost. Faces count where they
 //! pass through cells that the surface does not, if an edge is lost near by, away from the surface; or if there is no surface about, for
@@ -9,7 +9,7 @@
 //! own faces, edges and corners get none. What bounds a solid gets none either, however thin the solid is, and sheets that lie within two
 //! cells of a surface are taken for part of it.
 //!
-//! Cost: that of a scan, and of a [`Band`] of half the width; some 50 ns a lattice point near a lost face, and 0.3 us a brick for the union.
+//! Cost: that of a scan, and of a [`Band`] of half the width; a hash probe or two for each lattice point near a face in question.
 
 use super::band::{All, Band, MOST_CELLS, Wanted};
 use super::scan_oriented;

@@ -19,8 +19,9 @@
 //!
 //! # Cost
 //!
-//! 3 KB for each brick that the band touches. Step 1: some 1.5 us for a triangle smaller than a cell. Step 2: about 20 us a brick and round; a
-//! brick takes part in three or four.
+//! 3 KB for each brick that the band touches. Step 1: the closest points of the lattice points about a triangle, some 80 if it is smaller than
+//! a cell. Step 2: 26 candidates for each point of a brick, in each round that it takes part in. Step 3: some 27 to 81 candidates for each
+//! point within a cell of the rim.
 
 mod near;
 mod refine;
