@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// The stages of a repair, in the order in which they run.
+/// The stages of a repair, in the order in which they run, and other long work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// Reading and snapping the input; unit: bytes or points.
@@ -13,10 +13,14 @@ pub enum Stage {
     Close,
     /// Inside and outside; unit: bricks.
     Sign,
+    /// Cutting handles, filling tunnels; unit: layers of thinning, whose number is not known before.
+    Topology,
     /// Extracting the surface; unit: bricks.
     Contour,
     /// Writing the output; unit: bytes.
     Write,
+    /// Measuring distances between two surfaces; unit: points.
+    Measure,
 }
 
 impl Stage {
@@ -27,8 +31,10 @@ impl Stage {
             Stage::Scan => "scan",
             Stage::Close => "close",
             Stage::Sign => "sign",
+            Stage::Topology => "topology",
             Stage::Contour => "contour",
             Stage::Write => "write",
+            Stage::Measure => "measure",
         }
     }
 }

@@ -7,7 +7,8 @@
 //! "The element at +x" is the plane shifted, with a carry from the neighbouring brick; a question about 512 elements is
 //! eight word operations. All methods cost a few operations per word (eight words) and allocate nothing.
 
-use std::ops::{BitAnd, BitOr, BitXor, BitXorAssign, Not};
+use super::Axis;
+use std::ops::{BitAnd, BitAndAssign, BitOr, BitOrAssign, BitXor, BitXorAssign, Not};
 
 /// Cells a side of a brick.
 pub const BRICK_SIDE: u32 = 8;
@@ -151,6 +152,67 @@ impl Plane {
         Plane(std::array::from_fn(|x| (self.0[x] << 1 & !Z0) | (previous.0[x] >> 7 & Z0)))
     }
 
+    /// The plane of the elements one step further along `axis`; `next` is the brick there.
+    #[inline]
+    #[must_use]
+    pub fn at_plus(&self, axis: Axis, next: &Plane) -> Plane {
+        match axis {
+            Axis::X => self.at_plus_x(next),
+            Axis::Y => self.at_plus_y(next),
+            Axis::Z => self.at_plus_z(next),
+        }
+    }
+
+    /// The plane of the elements one step back along `axis`; `previous` is the brick there.
+    #[inline]
+    #[must_use]
+    pub fn at_minus(&self, axis: Axis, previous: &Plane) -> Plane {
+        match axis {
+            Axis::X => self.at_minus_x(previous),
+            Axis::Y => self.at_minus_y(previous),
+            Axis::Z => self.at_minus_z(previous),
+        }
+    }
+
+    /// The 64 bits of the layer in which `axis` is 7, packed in some order: what [`from_low_layer`](Plane::from_low_layer) takes.
+    #[inline]
+    pub fn high_layer(&self, axis: Axis) -> u64 {
+        let words = || (0u32..).zip(self.0);
+        match axis {
+            Axis::X => self.0[7],
+            Axis::Y => words().fold(0, |layer, (x, w)| layer | (w >> 56) << (8 * x)),
+            Axis::Z => words().fold(0, |layer, (x, w)| layer | (w >> 7 & Z0) << x),
+        }
+    }
+
+    /// The 64 bits of the layer in which `axis` is 0, in the order of [`high_layer`](Plane::high_layer).
+    #[inline]
+    pub fn low_layer(&self, axis: Axis) -> u64 {
+        let words = || (0u32..).zip(self.0);
+        match axis {
+            Axis::X => self.0[0],
+            Axis::Y => words().fold(0, |layer, (x, w)| layer | (w & Y0) << (8 * x)),
+            Axis::Z => words().fold(0, |layer, (x, w)| layer | (w & Z0) << x),
+        }
+    }
+
+    /// A plane with these bits in the layer in which `axis` is 0, and no others.
+    #[inline]
+    #[must_use]
+    pub fn from_low_layer(axis: Axis, layer: u64) -> Plane {
+        match axis {
+            Axis::X => Plane([layer, 0, 0, 0, 0, 0, 0, 0]),
+            Axis::Y => Plane(std::array::from_fn(|x| layer >> (8 * x) & Y0)),
+            Axis::Z => Plane(std::array::from_fn(|x| layer >> x & Z0)),
+        }
+    }
+
+    /// The plane turned over: position `(x, y, z)` comes to `(7 - x, 7 - y, 7 - z)`, index `i` to `511 - i`.
+    #[must_use]
+    pub fn turned_over(&self) -> Plane {
+        Plane(std::array::from_fn(|x| self.0[7 - x].reverse_bits()))
+    }
+
     /// Prefix parity along x: the result at x is `carry` flipped once for each bit set at x' < x on the same line (64
     /// lines at once, one bit of `carry` each). Also returns the carry into the brick at +x.
     #[must_use]
@@ -162,6 +224,26 @@ impl Plane {
             here
         }));
         (plane, parity)
+    }
+
+    /// Whether a bit is set in the layer in which `axis` is 0.
+    #[inline]
+    pub fn touches_min(&self, axis: Axis) -> bool {
+        match axis {
+            Axis::X => self.touches_min_x(),
+            Axis::Y => self.touches_min_y(),
+            Axis::Z => self.touches_min_z(),
+        }
+    }
+
+    /// Whether a bit is set in the layer in which `axis` is 7.
+    #[inline]
+    pub fn touches_max(&self, axis: Axis) -> bool {
+        match axis {
+            Axis::X => self.0[7] != 0,
+            Axis::Y => self.any(Y0 << 56),
+            Axis::Z => self.any(Z0 << 7),
+        }
     }
 
     /// Whether a bit with x = 0 is set.
@@ -211,6 +293,18 @@ macro_rules! wordwise {
 }
 
 wordwise!(BitAnd bitand, BitOr bitor, BitXor bitxor);
+
+impl BitAndAssign for Plane {
+    fn bitand_assign(&mut self, other: Plane) {
+        *self = *self & other;
+    }
+}
+
+impl BitOrAssign for Plane {
+    fn bitor_assign(&mut self, other: Plane) {
+        *self = *self | other;
+    }
+}
 
 impl BitXorAssign for Plane {
     fn bitxor_assign(&mut self, other: Plane) {
@@ -312,6 +406,20 @@ mod tests {
                 prop_assert!(plane.get(p));
                 prop_assert_eq!(plane.rank(p), n as u32);
             }
+        }
+
+        #[test]
+        fn layers_are_what_shifts_carry(words in any::<[u64; 8]>()) {
+            let plane = Plane(words);
+            for axis in Axis::ALL {
+                let high = Plane::from_low_layer(axis, plane.high_layer(axis));
+                prop_assert_eq!(high, Plane::EMPTY.at_minus(axis, &plane));
+                let low = Plane::from_low_layer(axis, plane.low_layer(axis));
+                prop_assert_eq!(plane.touches_min(axis), !low.is_empty());
+                prop_assert_eq!(plane.touches_max(axis), !high.is_empty());
+                prop_assert_eq!(low, plane_from(|c| c[axis.index()] == 0 && plane.get(Local::new(c[0], c[1], c[2]))));
+            }
+            prop_assert_eq!(plane.turned_over(), plane_from(|[x, y, z]| plane.get(Local::new(7 - x, 7 - y, 7 - z))));
         }
 
         #[test]

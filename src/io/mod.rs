@@ -44,6 +44,8 @@ mod off;
 mod ply;
 #[cfg(any(feature = "gltf", feature = "3mf"))]
 mod scene;
+pub mod skeleton;
+pub mod skt;
 mod stl;
 mod text;
 #[cfg(feature = "3mf")]

@@ -136,6 +136,13 @@ pub fn lattice_point(depth: u32, element: Key) -> [u32; 3] {
     element.min_corner().map(|c| c / (SIDE >> depth))
 }
 
+/// The brick that owns a finest element, which is the one that holds its start, and the element's position in it. No brick owns what
+/// starts on the root's high faces.
+pub fn owner(depth: u32, element: Key) -> (Option<Key>, Local) {
+    let at = lattice_point(depth, element);
+    (Key::cell(depth - 3, at.map(|c| c >> 3)), Local::new(at[0], at[1], at[2]))
+}
+
 /// Whether so many crossings can be numbered: places in the arrays have 32 bits.
 ///
 /// # Errors
@@ -233,9 +240,8 @@ impl Crossings {
 
     /// The brick that owns a finest element, and the element's position in it.
     fn home(&self, element: Key) -> (&Brick, Local) {
-        let at = lattice_point(self.depth, element);
-        let key = Key::cell(self.depth - 3, at.map(|c| c >> 3));
-        (self.brick_or_nothing(key), Local::new(at[0], at[1], at[2]))
+        let (key, local) = owner(self.depth, element);
+        (self.brick_or_nothing(key), local)
     }
 
     /// Whether a finest edge is crossed.
@@ -251,7 +257,7 @@ impl Crossings {
     }
 
     /// The sample at a place of the arrays.
-    pub(super) fn sample_at(&self, place: usize) -> Sample {
+    pub(crate) fn sample_at(&self, place: usize) -> Sample {
         Sample { offset: self.offsets[place], normal: if self.with_normals { self.normals[place] } else { 0 } }
     }
 
@@ -355,6 +361,44 @@ impl Crossings {
         }
         drop(toggles);
         builder.finish_within(progress)
+    }
+
+    /// Only those crossings that `kept` names for each brick: none that is not there. Cost: linear.
+    #[must_use]
+    pub(crate) fn retained(&self, kept: impl Fn(usize) -> [Plane; 3] + Sync + Send) -> Crossings {
+        let planes: Vec<[Plane; 3]> = (0..self.bricks.len()).into_par_iter().map(kept).collect();
+        let mut builder = Builder::new(self.depth, self.with_normals);
+        let (mut offsets, mut normals) = (Vec::new(), Vec::new());
+        for (brick, kept) in self.bricks.iter().zip(planes) {
+            let mut place = brick.first as usize;
+            for (crossed, kept) in brick.crossed.iter().zip(&kept) {
+                for local in crossed.iter() {
+                    if kept.get(local) {
+                        let sample = self.sample_at(place);
+                        offsets.push(sample.offset);
+                        normals.push(sample.normal);
+                    }
+                    place += 1;
+                }
+            }
+            builder.push(brick.key, kept, &offsets, &normals);
+            offsets.clear();
+            normals.clear();
+        }
+        builder.finish()
+    }
+
+    /// The cells of a brick with a crossed edge: those that hold a piece of the surface.
+    pub(crate) fn mixed_cells(&self, brick: &Brick) -> Plane {
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, pxz, pyz] = self.plus(brick).map(|b| &b.crossed);
+        let x = *x | x.at_plus_y(&py[0]);
+        let next_x = pz[0] | pz[0].at_plus_y(&pyz[0]);
+        let y = *y | y.at_plus_x(&px[1]);
+        let next_y = pz[1] | pz[1].at_plus_x(&pxz[1]);
+        let z = *z | z.at_plus_x(&px[2]);
+        let next_z = py[2] | py[2].at_plus_x(&pxy[2]);
+        x | x.at_plus_z(&next_x) | y | y.at_plus_z(&next_y) | z | z.at_plus_y(&next_z)
     }
 
     /// The first broken invariant, in words. Cost: linear, a few hash probes a brick.

@@ -22,13 +22,17 @@
 
 pub(crate) mod cells;
 pub mod compact;
+pub mod components;
 pub mod crossings;
+pub mod edited;
 pub mod hits;
 mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub(crate) mod point_set;
 pub mod points;
+pub mod regions;
 pub mod segments;
 pub mod signed;
 mod traverse;
@@ -45,6 +49,7 @@ use crate::grid::key::MAX_LEVEL;
 
 pub use compact::CompactOctree;
 pub use crossings::Crossings;
+pub use edited::EditedOctree;
 pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
 pub use points::{CellPoints, StoredPoints};

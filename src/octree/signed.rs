@@ -1,7 +1,7 @@
 //! Inside and outside at every lattice point: what repair, topology and contouring meet in.
 
 use super::cells::Cells;
-use super::crossings::{Builder, Crossings, Sample, finest_element, position, toward};
+use super::crossings::{Builder, Crossings, Sample, finest_element, lattice_point, position, toward};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
 use crate::parallel::{in_order, pieces};
@@ -131,7 +131,12 @@ impl SignedOctree {
         SignedOctree::from_crossings(builder.finish())
     }
 
-    /// Crossings and signs, taken apart.
+    /// An octree of which nothing is inside.
+    pub fn empty(depth: u32) -> Self {
+        SignedOctree { crossings: Builder::new(depth, false).finish(), inside: Vec::new() }
+    }
+
+    /// Crossings and signs, as [`new`](Self::new) takes them.
     pub fn into_parts(self) -> (Crossings, Vec<Plane>) {
         (self.crossings, self.inside)
     }
@@ -144,6 +149,35 @@ impl SignedOctree {
     /// For each brick, its points that are inside.
     pub fn inside(&self) -> &[Plane] {
         &self.inside
+    }
+
+    /// The corners of the cells of brick `i` that are inside, by corner number: the sign changes along a crossed edge, so all follow from
+    /// the brick's points. Cost: some 30 ns.
+    pub fn corners(&self, i: usize) -> [Plane; 8] {
+        let brick = &self.crossings.bricks()[i];
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, ..] = self.crossings.plus(brick).map(|b| &b.crossed);
+        let c0 = self.inside[i];
+        let (c1, c2, c4) = (c0 ^ *z, c0 ^ *y, c0 ^ *x);
+        let z_at_x = z.at_plus_x(&px[2]);
+        let c3 = c2 ^ z.at_plus_y(&py[2]);
+        let (c5, c6) = (c4 ^ z_at_x, c4 ^ y.at_plus_x(&px[1]));
+        let c7 = c6 ^ z_at_x.at_plus_y(&py[2].at_plus_x(&pxy[2]));
+        debug_assert_eq!(c3, c1 ^ y.at_plus_z(&pz[1]), "no face is odd");
+        [c0, c1, c2, c3, c4, c5, c6, c7]
+    }
+
+    /// The elements of brick `i` all corners of which are inside, by extent: the part of the closed cubical complex that the brick owns.
+    /// Cost: some 40 ns.
+    pub fn elements(&self, i: usize) -> [Plane; 8] {
+        // An element stretches from its start along some axes: its corners are the subsets of its extent.
+        let mut planes = self.corners(i);
+        for bit in [1, 2, 4] {
+            for extent in (0..8).filter(|extent| extent & bit != 0) {
+                planes[extent] &= planes[extent ^ bit];
+            }
+        }
+        planes
     }
 
     /// The cells of brick `i` with corners of both signs.
@@ -171,6 +205,15 @@ impl SignedOctree {
             }
         }
         false
+    }
+
+    /// What bricks that are not in the list are. Cost: some 50 ns a brick.
+    pub fn uniform(&self) -> Uniform<'_> {
+        let bricks = self.crossings.bricks();
+        let row = |i| (Uniform::code(self.crossings.origin(&bricks[i]).map(|c| c >> 3)), i as u32);
+        let mut rows: Vec<(u64, u32)> = (0..bricks.len()).into_par_iter().map(row).collect();
+        rows.par_sort_unstable();
+        Uniform { octree: self, rows }
     }
 
     /// Volume enclosed, in cells: the length of all lines of the grid along one axis that is inside. The axis is the one with most crossings:
@@ -234,9 +277,32 @@ impl SignedOctree {
     }
 }
 
+/// The signs of bricks that are not in the list of an octree.
+#[derive(Debug)]
+pub struct Uniform<'a> {
+    octree: &'a SignedOctree,
+    /// Bricks by y, z, x, and their places.
+    rows: Vec<(u64, u32)>,
+}
+
+impl Uniform<'_> {
+    fn code([x, y, z]: [u32; 3]) -> u64 {
+        (u64::from(y) << 16 | u64::from(z)) << 16 | u64::from(x)
+    }
+
+    /// Whether the points of a brick that is not in the list are inside. Cost: a binary search.
+    pub fn is_inside(&self, brick: Key) -> bool {
+        let code = Uniform::code(lattice_point(self.octree.crossings.depth(), brick).map(|c| c >> 3));
+        let Some(&(last, i)) = self.rows[..self.rows.partition_point(|row| row.0 < code)].last() else { return false };
+        let end = Local::new(7, 0, 0);
+        let i = i as usize;
+        last >> 16 == code >> 16
+            && self.octree.inside[i].get(end) != self.octree.crossings.bricks()[i].crossed[0].get(end)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::crossings::lattice_point;
     use super::*;
     use proptest::prelude::*;
 
@@ -275,6 +341,11 @@ mod tests {
             for i in 0..32 * 32 * 32 {
                 let p = [i >> 10, i >> 5 & 31, i & 31];
                 prop_assert_eq!(octree.is_inside(p), within(p), "{:?}", p);
+            }
+            let rows = octree.uniform();
+            for key in (0..64).map(|i| Key::cell(DEPTH - 3, [i >> 4, i >> 2 & 3, i & 3]).unwrap()) {
+                let is_listed = octree.crossings().find(key).is_some();
+                prop_assert!(is_listed || rows.is_inside(key) == within(lattice_point(DEPTH, key)), "{}", key);
             }
             // The bricks it kept are enough to build it again.
             let kept: Vec<_> =

@@ -1,7 +1,7 @@
 //! `zmend info`: what a mesh is and what is wrong with it.
 
 use crate::args::InfoArgs;
-use crate::measure::{Measured, Side};
+use crate::measure::{Loaded, Measured, Side};
 use crate::print::{self, Table};
 use crate::units::{real, vector};
 use crate::{json, units};
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
             }
             continue;
         }
-        match look(path) {
+        match look(path, args.quick) {
             Ok((info, measured)) if args.json => print::out(&as_json(&info, measured))?,
             Ok((info, measured)) => {
                 let gap = if i > 0 { "\n" } else { "" };
@@ -41,10 +41,9 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     Ok(code)
 }
 
-fn look(path: &Path) -> Result<(InputInfo, Measured)> {
-    let input = io::open(path)?;
-    let measured = Measured::input(&input)?;
-    Ok((input.info().clone(), measured))
+fn look(path: &Path, quick: bool) -> Result<(InputInfo, Measured)> {
+    let file = Loaded::open(path)?;
+    Ok((file.info().clone(), file.measured(quick)))
 }
 
 /// What is to be said of an octree file; `None` of others.

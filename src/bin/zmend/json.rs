@@ -1,6 +1,7 @@
-//! Results as JSON, for scripts. Lengths, areas and volumes are in model units; unknown values are null.
+//! Results as JSON, for scripts. Lengths, areas and volumes are in model units; unknown values are null. Self-intersections
+//! are counted up to a limit, and one more than the limit stands for all beyond.
 
-use crate::measure::{Measured, Side};
+use crate::measure::{Crossings, Measured, Side};
 use glam::DVec3;
 use serde_json::{Value, json};
 use zmend::geom::Frame;
@@ -36,6 +37,7 @@ pub(crate) fn side(side: &Side) -> Value {
         "degenerate_faces": r.map(|r| r.degenerate_faces),
         "zero_area_faces": r.map(|r| r.zero_area_faces),
         "duplicate_faces": r.map(|r| r.duplicate_faces),
+        "self_intersections": measured.and_then(|m| m.crossings).map(Crossings::least),
         "euler": r.map(|r| r.euler).or(side.euler),
         "genus": r.and_then(|r| r.genus),
         "volume": r.map(|r| r.volume).or(side.volume),

@@ -155,7 +155,7 @@ impl<D: Dialect> Decoder<'_, '_, D> {
         let (brick, at) = self.brick_around(cell);
         if is_inside {
             let cube = Plane::cube(at, 1 << (depth - level));
-            brick.corners.iter_mut().for_each(|plane| *plane = *plane | cube);
+            brick.corners.iter_mut().for_each(|plane| *plane |= cube);
         }
     }
 
