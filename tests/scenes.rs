@@ -273,13 +273,12 @@ fn archives_that_make_no_sense_are_refused() {
     let circle = r#"<object id="1"><components><component objectid="1"/></components></object>"#;
     assert!(refusal(circle, r#"<item objectid="1"/>"#).contains("part of itself"));
     // Thirty levels of a hundred parts each.
-    let levels: String = (1..30)
-        .map(|i| {
-            let component = format!(r#"<component objectid="{i}"/>"#);
-            format!(r#"<object id="{}"><components>{}</components></object>"#, i + 1, component.repeat(100))
-        })
-        .collect();
-    let error = refusal(&(object(TRIANGLE) + &levels), r#"<item objectid="30"/>"#);
+    let level = |i: u32| {
+        let component = format!(r#"<component objectid="{i}"/>"#);
+        format!(r#"<object id="{}"><components>{}</components></object>"#, i + 1, component.repeat(100))
+    };
+    let levels: Vec<String> = (1..30).map(level).collect();
+    let error = refusal(&(object(TRIANGLE) + &levels.concat()), r#"<item objectid="30"/>"#);
     assert!(error.contains("too often"), "{error}");
     let cut = model(&object(TRIANGLE), "");
     assert!(problem(&archive(&[("a.model", &cut.as_bytes()[..cut.len() - 20])], true)).contains("a.model"));

@@ -7,7 +7,7 @@ use crate::octree::{CellPoints, SignedOctree};
 use glam::DVec3;
 
 /// The points that dual contouring gives to the cells of an octree, made when asked for. Cells with several sheets get the one point that
-/// fits all of their crossings.
+/// fits all of their crossings, and no point leaves its cell, as readers of SOG files expect.
 ///
 /// Cost: about 60 ns a cell.
 #[derive(Debug, Clone, Copy)]
