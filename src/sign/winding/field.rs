@@ -16,8 +16,8 @@
 //! Cost: some 15,000 instructions a brick of each level; 2 KB a brick while a level is solved and 1 KB after that. Steps read the last step's
 //! values, bricks are independent and sums have a fixed order: results do not depend on threads.
 
-use super::relax::{Block, Grid, UNIT, Values, rounds, store, weights};
-use super::sources::Sources;
+use super::relax::{Block, Grid, UNIT, Values, store, weights};
+use super::sources::{Source, Sources};
 use super::world;
 use crate::error::Result;
 use crate::grid::brick::Local;
@@ -68,14 +68,14 @@ impl Level {
     }
 }
 
-/// Solves for sources at points of the world's finest bricks. `wanted` says whether the final surface may run through a brick of the world
+/// Solves for sources at points of the world's finest bricks, by axis (see [`Source`]). `wanted` says whether the final surface may run through a brick of the world
 /// in which values are in a range.
 ///
 /// # Errors
 /// `Cancelled`.
 pub(super) fn solve(
     depth: u32,
-    points: Vec<(Key, Local, i32)>,
+    points: Vec<(Key, Local, Axis, i32)>,
     far: Dipole,
     wanted: impl Fn(Key, [f32; 2]) -> bool + Sync,
     progress: &dyn Progress,
@@ -194,25 +194,23 @@ impl Field {
             index.insert(key, i);
         }
         let mut grid = Grid::new(&keys, &index);
-        self.start(level, &keys, &mut grid);
-        let of_brick: Vec<&[(Local, f32)]> = keys.par_iter().map(|&key| sources.of(key)).collect();
+        self.start(level, &keys, sources, &mut grid);
+        let of_brick: Vec<&[Source]> = keys.par_iter().map(|&key| sources.of(key)).collect();
         let mut next = vec![[0; 512]; keys.len()];
-        for _ in 0..rounds(level, self.finest) {
+        for weight in weights(level, self.finest) {
             check(progress)?;
-            for weight in weights() {
-                next.par_iter_mut().enumerate().with_min_len(16).for_each_init(Block::new, |block, (i, out)| {
-                    grid.gather(i, block);
-                    block.step(of_brick[i], weight, out);
-                });
-                std::mem::swap(&mut grid.values, &mut next);
-            }
+            next.par_iter_mut().enumerate().with_min_len(16).for_each_init(Block::new, |block, (i, out)| {
+                grid.gather(i, block);
+                block.step(of_brick[i], weight, out);
+            });
+            std::mem::swap(&mut grid.values, &mut next);
         }
         self.levels.push(Level { keys, index, grid });
         Ok(())
     }
 
     /// First values of the bricks of a level, and those beyond their open sides, from the coarser level.
-    fn start(&self, level: u32, keys: &[Key], grid: &mut Grid) {
+    fn start(&self, level: u32, keys: &[Key], sources: &Sources, grid: &mut Grid) {
         if level == 0 {
             // The world's own sides, in order.
             let far = |side, n| store(self.at(0, Block::beyond(side, n)) * UNIT);
@@ -241,6 +239,12 @@ impl Field {
                 let mut fixed = fixed.iter_mut();
                 for ((key, sides), out) in family.iter().zip(sides).zip(values) {
                     fine.refined(coarse, key.corner_in_parent());
+                    for (x, y) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                        let [i, j, k] = world::coords(*key).map(i64::from);
+                        if let Some(brick) = world::brick(level, [i + x, j + y, k]) {
+                            fine.jump(sources.of(brick), [8 * x as usize, 8 * y as usize, 0]);
+                        }
+                    }
                     fine.store(out);
                     for (side, _) in sides.iter().enumerate().filter(|(_, side)| Grid::is_open(**side)) {
                         fine.store_side(side, fixed.next().expect("as many as open sides"));

@@ -18,7 +18,6 @@ use crate::progress::{Progress, Stage, check};
 use crate::sign::close::{Switch, span};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Patches that span the boundary of an oriented surface.
 #[derive(Debug)]
@@ -98,9 +97,11 @@ pub struct Winding {
 const THRESHOLD: f32 = 0.5;
 /// Beside a flat sheet the winding number comes as near to one half as the sheet is large, on one side from below, and inside of a solid
 /// from above. What is rounded must not make a crust of the sheet, or a slit in the solid. So points for which patches and hits together
-/// say outside must be above the threshold by this, and those for which they say inside may be below it. It moves the surface by a
-/// sixtieth of a hole's radius.
+/// say outside must be above the threshold by this, and those for which they say inside may be below it. In holes it moves the surface by
+/// a thirtieth of their radius at most.
 const HOLD: f32 = 1.0 / 64.0;
+/// The same beside a hit. At the rim of a sheet, the steps of the grid are seen under an angle.
+const HOLD_AT_HITS: f32 = 1.0 / 8.0;
 /// Values of coarser levels are trusted that far.
 const MARGIN: f32 = 0.1;
 
@@ -132,7 +133,12 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
         |i| {
             let key = world::from_root(depth, bricks.keys[i]);
             let values = field.values(key);
-            Above { values, value: if values.is_some() { 0.0 } else { field.middle(key) }, inside: Plane::EMPTY }
+            let (value, at_hits) = if values.is_some() {
+                (0.0, ends_of_hits(hits, bricks.keys[i]))
+            } else {
+                (field.middle(key), Plane::EMPTY)
+            };
+            Above { values, value, at_hits, inside: Plane::EMPTY }
         },
     );
     let mut clipped = 0;
@@ -191,9 +197,9 @@ pub(super) fn numbers(hits: &OrientedHits, patches: &Patches) -> impl Fn([u32; 3
 }
 
 /// Whether a point is inside, from its whole number and its smooth part.
-fn is_inside(number: i32, smooth: f32) -> bool {
-    let hold = if number > 0 { -HOLD } else { HOLD };
-    number as f32 - smooth > THRESHOLD + hold
+fn is_inside(number: i32, smooth: f32, beside_hit: bool) -> bool {
+    let hold = if beside_hit { HOLD_AT_HITS } else { HOLD };
+    number as f32 - smooth > THRESHOLD + if number > 0 { -hold } else { hold }
 }
 
 /// Whether the final surface may run where the smooth part is in a range, and the whole number is known or not.
@@ -208,6 +214,14 @@ fn may_pass(number: Option<i32>, [low, high]: [f32; 2]) -> bool {
 /// The least whole number that is inside where the smooth part is not near to what decides.
 fn least(smooth: f32) -> i32 {
     (smooth + THRESHOLD).floor() as i32 + 1
+}
+
+/// The points of a brick at which a hit edge starts or ends.
+fn ends_of_hits(hits: &OrientedHits, brick: Key) -> Plane {
+    let hit = |key: Option<Key>| hits.edges().brick_or_nothing(key).crossed;
+    let [x, y, z] = hit(Some(brick));
+    let [px, py, pz] = Axis::ALL.map(|axis| hit(brick.neighbour(Face::new(axis, false)))[axis.index()]);
+    x | y | z | x.at_minus_x(&px) | y.at_minus_y(&py) | z.at_minus_z(&pz)
 }
 
 /// Makes the points on the root's boundary outside. Also returns how many points next to it are inside.
@@ -235,6 +249,8 @@ struct Above<'a> {
     values: Option<&'a Values>,
     /// Where that is not known, the same for all.
     value: f32,
+    /// The points at an end of a hit edge, if values are known.
+    at_hits: Plane,
     inside: Plane,
 }
 
@@ -245,7 +261,11 @@ impl Layer<Plane> for Above<'_> {
             return;
         };
         let numbers = counter.values();
-        let bit = |line: usize| u64::from(is_inside(numbers[line], f32::from(values[64 * x + line]) / UNIT));
+        let at_hits = self.at_hits.0[x];
+        let bit = |line: usize| {
+            let smooth = f32::from(values[64 * x + line]) / UNIT;
+            u64::from(is_inside(numbers[line], smooth, at_hits >> line & 1 == 1))
+        };
         self.inside.0[x] = (0..64).fold(0, |word, line| word | bit(line) << line);
     }
 
@@ -260,6 +280,8 @@ struct Bricks<'a> {
     patches: &'a Patches,
     /// Sorted.
     keys: Vec<Key>,
+    /// Where the edges of each brick begin among those of the patches, and the end.
+    firsts: Vec<u32>,
 }
 
 impl<'a> Bricks<'a> {
@@ -269,7 +291,7 @@ impl<'a> Bricks<'a> {
         let mut of_patches: Vec<Key> = patches.edges.iter().map(|&(edge, _)| brick_of(depth, edge)).collect();
         of_patches.dedup();
         let keys = hits.edges().bricks().iter().map(|brick| brick.key).collect();
-        Bricks { hits, patches, keys }.with(of_patches.into_iter())
+        Bricks { hits, patches, keys, firsts: Vec::new() }.with(of_patches.into_iter())
     }
 
     /// More bricks, and those before them along each axis.
@@ -281,7 +303,19 @@ impl<'a> Bricks<'a> {
         }));
         keys.par_sort_unstable();
         keys.dedup();
-        Bricks { keys, ..self }
+        // Edges are sorted by their middles: those of a brick stand together, and bricks in order.
+        let depth = self.hits.edges().depth();
+        let mut edges = self.patches.edges.iter().map(|edge| brick_of(depth, edge.0)).peekable();
+        let mut count = 0;
+        let mut firsts = Vec::with_capacity(keys.len() + 1);
+        for &key in &keys {
+            firsts.push(count);
+            while edges.next_if_eq(&key).is_some() {
+                count += 1;
+            }
+        }
+        firsts.push(count);
+        Bricks { keys, firsts, ..self }
     }
 
     fn rows(&self) -> Rows {
@@ -304,7 +338,7 @@ impl<'a> Bricks<'a> {
             steps.more.iter_mut().for_each(|(_, jump)| *jump = -*jump);
         }
         let (depth, before) = (edges.depth(), steps.more.len());
-        for &(edge, jump) in &self.patches.edges[self.patches.range(depth, key)] {
+        for &(edge, jump) in &self.patches.edges[self.firsts[i] as usize..self.firsts[i + 1] as usize] {
             if edge.dir() == Axis::X.into() {
                 let [x, y, z] = lattice_point(depth, edge);
                 steps.more.push((Local::new(x, y, z), jump));
@@ -335,13 +369,6 @@ fn brick_of(depth: u32, edge: Key) -> Key {
 }
 
 impl Patches {
-    /// The places of the edges of a brick. Those of a brick stand together, and bricks in order.
-    fn range(&self, depth: u32, brick: Key) -> Range<usize> {
-        let start = self.edges.partition_point(|&(edge, _)| brick_of(depth, edge) < brick);
-        let len = self.edges[start..].iter().take_while(|&&(edge, _)| brick_of(depth, edge) == brick).count();
-        start..start + len
-    }
-
     /// Both ends of each edge.
     fn ends(&self, depth: u32) -> impl Iterator<Item = ([[u32; 3]; 2], Axis, i32)> {
         self.edges.iter().map(move |&(edge, jump)| {
@@ -354,9 +381,9 @@ impl Patches {
     }
 
     /// The sources of the smooth part.
-    fn sources(&self, depth: u32) -> Vec<(Key, Local, i32)> {
-        let at = |[x, y, z]: [u32; 3], strength| (world::at_point(depth, [x, y, z]), Local::new(x, y, z), strength);
-        self.ends(depth).flat_map(|([start, end], _, jump)| [at(start, jump), at(end, -jump)]).collect()
+    fn sources(&self, depth: u32) -> Vec<(Key, Local, Axis, i32)> {
+        let at = |[x, y, z]: [u32; 3], axis, jump| (world::at_point(depth, [x, y, z]), Local::new(x, y, z), axis, jump);
+        self.ends(depth).flat_map(|([start, end], axis, jump)| [at(start, axis, jump), at(end, axis, -jump)]).collect()
     }
 
     /// What they are from afar.

@@ -2,10 +2,10 @@
 //!
 //! A step replaces the value at each point by a weighted mean of itself and of what its six neighbours and its source say (Jacobi). Weights are
 //! the reciprocals of the zeros of a Chebyshev polynomial, so that a round of six steps flattens to 2 percent all that a coarser level
-//! cannot see. The 8^3 values of a brick and those beyond its sides are gathered in a block of 10^3; then a step is ten operations on
+//! cannot see; four steps do it to 4 percent. The 8^3 values of a brick and those beyond its sides are gathered in a block of 10^3; then a step is ten operations on
 //! rows of eight.
 
-use crate::grid::brick::Local;
+use super::sources::Source;
 use crate::grid::{Axis, Corner, Face, Key};
 use crate::octree::LinearOctree;
 use rayon::prelude::*;
@@ -17,27 +17,25 @@ pub(super) type Side = [i16; 64];
 /// Values are up to 16, to 1/2048.
 pub(super) const UNIT: f32 = 2048.0;
 
-/// Steps of a round.
-const STEPS: usize = 6;
-/// A round flattens all that has this or more of the steepness of what alternates from point to point, which has 2.
+/// What alternates from point to point has steepness 2. A round flattens all that has so much or more of it, by steps as long as the reciprocals
+/// of the zeros of a polynomial between. Long and short ones take turns, so that nothing grows meanwhile.
 const FLATTENED: f64 = 0.3;
+const LONG_ROUND: [f64; 6] = [3.0, 2.0, 5.0, 0.0, 4.0, 1.0];
+const SHORT_ROUND: [f64; 4] = [2.0, 1.0, 3.0, 0.0];
 
-/// The weights of the steps of a round.
-pub(super) fn weights() -> [f32; STEPS] {
-    let (middle, half) = (0.5 * (2.0 + FLATTENED), 0.5 * (2.0 - FLATTENED));
-    // Long and short steps in turn, so that nothing grows in between.
-    [3, 2, 5, 0, 4, 1].map(|i| {
-        let angle = std::f64::consts::PI * (f64::from(i) + 0.5) / STEPS as f64;
-        (1.0 / (middle + half * angle.cos())) as f32
-    })
-}
-
-/// Rounds of a level: many on the coarsest, which starts from nothing; some on others, which cost little; one on the two finest.
-pub(super) fn rounds(level: u32, finest: u32) -> usize {
+/// The weights of all steps of a level: many rounds on the coarsest, which starts from nothing; some on others, which cost little; one on the
+/// two finest, and that a short one on the very finest.
+pub(super) fn weights(level: u32, finest: u32) -> Vec<f32> {
+    let round = |order: &[f64]| -> Vec<f32> {
+        let (middle, half) = (0.5 * (2.0 + FLATTENED), 0.5 * (2.0 - FLATTENED));
+        let angle = |i: f64| std::f64::consts::PI * (i + 0.5) / order.len() as f64;
+        order.iter().map(|&i| (1.0 / (middle + half * angle(i).cos())) as f32).collect()
+    };
     match level {
-        0 => 20,
-        _ if level + 1 < finest => 3,
-        _ => 1,
+        0 => round(&LONG_ROUND).repeat(20),
+        _ if level + 1 < finest => round(&LONG_ROUND).repeat(3),
+        _ if level < finest => round(&LONG_ROUND),
+        _ => round(&SHORT_ROUND),
     }
 }
 
@@ -79,7 +77,7 @@ impl Block {
     }
 
     /// One step of relaxation.
-    pub(super) fn step(&self, sources: &[(Local, f32)], weight: f32, out: &mut Values) {
+    pub(super) fn step(&self, sources: &[Source], weight: f32, out: &mut Values) {
         let (keep, share) = (1.0 - weight, weight / 6.0);
         for (n, out) in out.as_chunks_mut::<8>().0.iter_mut().enumerate() {
             let at = row(n >> 3, n & 7);
@@ -91,9 +89,33 @@ impl Block {
                 store(keep * own[z] + share * sum)
             });
         }
-        for &(local, strength) in sources {
-            let value = &mut out[local.index() as usize];
-            *value = value.saturating_sub(store(UNIT * share * strength));
+        for source in sources {
+            let value = &mut out[source.at.index() as usize];
+            *value = value.saturating_sub(store(UNIT * share * source.strength()));
+        }
+    }
+
+    /// Lets what was [`refined`](Self::refined) jump where there are sources: a point between two coarse ones lies half way between what
+    /// these say of it, one from below and one from above. `by` is where the sources' brick is from this one, in points along x, y, z;
+    /// those of the bricks at +x, +y, +x+y matter as well, because points of one axis are made from those of the axes before.
+    ///
+    /// Without it, a patch that is flat would leave an error that is the same all along it, and that relaxation is slow to flatten.
+    pub(super) fn jump(&mut self, sources: &[Source], by: [usize; 3]) {
+        for source in sources {
+            let c = source.at.coords().map(|c| c as usize);
+            // Points were made along z first and along x last.
+            let Some(axis) = (0..3).find(|&a| c[a] % 2 == 1) else { continue };
+            let p: [usize; 3] = std::array::from_fn(|a| c[a] + by[a]);
+            let jump = -0.5 * UNIT * source.along[axis];
+            let reach = |a: usize| if a < axis { p[a].saturating_sub(1)..p[a] + 2 } else { p[a]..p[a] + 1 };
+            for x in reach(0) {
+                for y in reach(1) {
+                    let weight = if x == p[0] { 1.0 } else { 0.5 } * if y == p[1] { 1.0 } else { 0.5 };
+                    if x < 8 && y < 8 && p[2] < 8 {
+                        self.0[row(x, y) + p[2]] += weight * jump;
+                    }
+                }
+            }
         }
     }
 
@@ -250,6 +272,7 @@ impl Block {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::brick::Local;
 
     /// What is linear stays as it is, in every way that values take.
     #[test]
@@ -275,11 +298,11 @@ mod tests {
         for (i, &key) in keys.iter().enumerate() {
             grid.gather(i, &mut block);
             let mut out = [0; 512];
-            for weight in weights() {
+            for weight in weights(5, 6) {
                 block.step(&[], weight, &mut out);
                 assert_eq!(out, grid.values[i], "brick {i}");
             }
-            block.step(&[(Local::new(1, 2, 3), 0.75)], 0.8, &mut out);
+            block.step(&[Source { at: Local::new(1, 2, 3), along: [0.75, 1.0, -1.0] }], 0.8, &mut out);
             let at = Local::new(1, 2, 3).index() as usize;
             assert_eq!(i32::from(out[at]), i32::from(grid.values[i][at]) - (0.1 * UNIT).round() as i32);
             block.fill_corners();

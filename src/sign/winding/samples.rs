@@ -27,8 +27,10 @@ impl Rule {
 
     /// The hit at which an edge goes in or out, if any does: of several, the middle one. The outer end has the number 0.
     fn passing(self, hits: &[EdgeHit], starts_inside: bool) -> Option<EdgeHit> {
-        if self == Rule::Nonzero && hits.len() == 1 {
-            return Some(hits[0]);
+        if let [hit] = hits {
+            // It goes out, if the edge starts inside.
+            let fits = self == Rule::Nonzero || hit.leaves == (starts_inside == (self == Rule::Positive));
+            return fits.then_some(*hit);
         }
         let mut number = if starts_inside { -hits.iter().copied().map(EdgeHit::jump).sum::<i32>() } else { 0 };
         let passes = |hit: &&EdgeHit| {

@@ -115,12 +115,12 @@ fn soup(corners: &[[f64; 3]]) -> Mesh {
 fn assert_spanned(hits: &OrientedHits) {
     let mut jumps = jumps(hits);
     let found = circulations(hits);
-    assert_eq!(found, plain_circulations(&jumps));
+    assert!(found == plain_circulations(&jumps));
     let patches = Patches::new(hits, &found, &Silent).expect("not cancelled");
     for (edge, jump) in patches.edges() {
-        *jumps.entry(edge).or_insert(0) += jump;
+        *jumps.entry(edge).or_insert(0) += if patches.reversed() { -jump } else { jump };
     }
-    assert_eq!(plain_circulations(&jumps), []);
+    assert!(plain_circulations(&jumps).is_empty());
 }
 
 proptest! {
@@ -221,7 +221,7 @@ fn numbers_are_those_of_the_solid_angles() {
         let worst = errors.iter().copied().fold((0.0, [0; 3]), |a, b| if b.0 > a.0 { b } else { a });
         let mean = errors.iter().map(|e| e.0).sum::<f64>() / errors.len() as f64;
         println!("{name}: {} points, mean error {mean:.4}, worst {:.4} at {:?}", errors.len(), worst.0, worst.1);
-        assert!(mean < 0.01 && worst.0 < 0.08, "{name}: mean {mean}, worst {worst:?}");
+        assert!(mean < 0.006 && worst.0 < 0.12, "{name}: mean {mean}, worst {worst:?}");
     }
 }
 
