@@ -36,19 +36,22 @@
 //!
 //! - **The surface is made anew.** It lies within about a cell of the input, but it shares no vertices with it. What is thinner than a
 //!   cell may vanish or grow together: take a greater [`depth`](Options::depth).
-//! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside.
+//! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside, unless it is
+//!   [thickened](Options::thicken).
 //! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
 //!   their union.
-//! - **Self-intersections are not looked for.** Triangles of marching cubes keep to their cells; faces of dual contouring pass
-//!   through each other here and there, mostly at creases and in walls thinner than a cell.
+//! - **Faces of dual contouring may intersect**, here and there, mostly at creases and in walls thinner than a cell, unless
+//!   [`no_self_intersections`](Options::no_self_intersections) is asked for. Those of marching cubes and blocks never do.
+//!   [`Mesh::self_intersections`] finds them.
+//! - **Sharp edges may have notches** where they pass through cells in which the grid sees one side of them only.
 //!
 //! # Where to find what
 //!
 //! | module | what it does |
 //! |---|---|
 //! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
-//! | [`mesh`] | [`Mesh`], reports and validation, sources and sinks of meshes that pass by, broken samples to try |
-//! | [`io`] | STL, PLY, OBJ and OFF |
+//! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
+//! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring |
@@ -80,7 +83,8 @@
 //! # Features
 //!
 //! `cli` (on by default) builds the program `zmend` and brings its dependencies: libraries say `default-features = false`. `render`
-//! (part of `cli`) adds the module `render` and the dependency `png`.
+//! (part of `cli`) adds the module `render` and the dependency `png`; `gltf` and `3mf` (parts of `cli`) add these formats, and the
+//! dependencies `serde_json` for the one, `flate2` and `quick-xml` for the other.
 #![forbid(unsafe_code)]
 
 pub mod contour;
@@ -95,6 +99,7 @@ pub mod progress;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod repair;
+mod sets;
 pub mod sign;
 pub mod topology;
 
@@ -102,7 +107,9 @@ pub use error::{Error, Place, Result};
 /// The vectors of the public interface.
 pub use glam;
 pub use mesh::{Mesh, Polygons};
-pub use repair::{Faces, Inside, Options, RepairReport, Repaired, Solid, Surface, repair, repair_into, solidify};
+pub use repair::{
+    Faces, Inside, Keep, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into, solidify,
+};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

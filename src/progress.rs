@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// The stages of a repair, in the order in which they run.
+/// The stages of a repair, in the order in which they run, and other long work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// Reading and snapping the input; unit: bytes or points.
@@ -19,6 +19,8 @@ pub enum Stage {
     Contour,
     /// Writing the output; unit: bytes.
     Write,
+    /// Measuring distances between two surfaces; unit: points.
+    Measure,
 }
 
 impl Stage {
@@ -32,6 +34,7 @@ impl Stage {
             Stage::Topology => "topology",
             Stage::Contour => "contour",
             Stage::Write => "write",
+            Stage::Measure => "measure",
         }
     }
 }

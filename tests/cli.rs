@@ -107,7 +107,7 @@ fn samples_are_listed_and_written() {
     folder.run("sample cube gear.stl --force --detail 3").ok();
     assert_eq!(io::read(folder.path("gear.stl")).unwrap().faces.len(), 108);
     folder.run("sample nothing x.ply").fails(&["nothing", "knot-holes"]);
-    folder.run("sample knot x.gltf").fails(&["x.gltf", ".ply"]);
+    folder.run("sample knot x.jpeg").fails(&["x.jpeg", ".ply"]);
     folder.run("sample knot").refused(&["OUT"]);
     folder.run("sample").refused(&["NAME"]);
     folder.run("sample knot x.ply --detail 21").refused(&["detail"]);
@@ -304,7 +304,7 @@ fn errors_name_the_file_and_the_remedy() {
     folder.run("repair dir.ply out.ply").fails(&["dir.ply", "directory"]);
     folder.run("repair knot.ply dir.ply --force").fails(&["dir.ply", "directory"]);
     folder.run("repair knot.ply no/such/out.ply").fails(&["no/such/out.ply", "directory"]);
-    folder.run("repair knot.ply out.gltf").fails(&["out.gltf", ".ply"]);
+    folder.run("repair knot.ply out.jpeg").fails(&["out.jpeg", ".ply"]);
     folder.run("repair knot.ply out").fails(&["out: ", ".ply"]);
     folder.run("repair knot.ply").refused(&["OUT"]);
     folder.run("repair knot.ply a.ply -o b.ply").refused(&["cannot be used with"]);
@@ -378,6 +378,54 @@ fn pictures_are_drawn() {
     folder.run("render knot.ply b.png --size 100").refused(&["--size"]);
     folder.run("render knot.ply b.png --azimuth nan").refused(&["--azimuth"]);
     assert_eq!(folder.names(), ["a.png", "knot.ply"]);
+}
+
+#[test]
+fn octree_files_are_made_and_contoured() {
+    let folder = Folder::new();
+    for format in ["sof", "sog", "dcf"] {
+        folder.run(&format!("repair knot.ply a.{format} -d 6")).ok().says(&["on a grid of 64 cells", "surface cells"]);
+        let json = folder.run(&format!("repair a.{format} b.{format} --json")).ok().json();
+        assert_eq!((&json["input"]["depth"], &json["output"]["format"]), (&6.into(), &format.into()));
+        let (a, b) = (fs::read(folder.path(&format!("a.{format}"))), fs::read(folder.path(&format!("b.{format}"))));
+        assert_eq!(a.unwrap(), b.unwrap());
+        folder.run(&format!("info a.{format}")).ok().says(&["of 64 cells a side", "zmend repair"]);
+        let surface = if format == "sof" { "quads" } else { "dc" };
+        let ran = folder.run(&format!("repair a.{format} {format}.ply -s {surface} --report full --json")).ok();
+        assert_eq!((&ran.json()["output"]["solid"], ran.err.is_empty()), (&true.into(), format != "sof"), "{ran:?}");
+        assert_solid(&folder.path(&format!("{format}.ply")));
+    }
+    // The content says what it is, not the name; SOG files say where they lie.
+    fs::rename(folder.path("a.sog"), folder.path("a.x")).unwrap();
+    folder.run("repair a.x c.stl").ok().says(&["a solid"]);
+    let bounds = |name| io::read(folder.path(name)).unwrap().report().bounds;
+    folder.run("repair knot.ply d.stl -d 6 -q").ok();
+    assert!(bounds("c.stl").min.distance(bounds("d.stl").min) < 0.1);
+    // DCF has normals, SOF has not.
+    folder.run("repair a.dcf c.sof -q").ok();
+    folder.run("repair a.sof c.dcf").fails(&["normals", "SOF"]);
+    folder.run("repair a.sof e.ply -s dc").fails(&["surface", "mc"]);
+    folder.run("repair a.dcf e.ply -d 7").fails(&["depth", "grid of its own"]);
+    folder.run("repair a.dcf e.ply --scale 0.5").fails(&["scale"]);
+    folder.run("sample knot e.sog").fails(&["octree"]);
+    fs::write(folder.path("bad.sof"), [4, 0, 0, 0, 0, 1]).unwrap();
+    folder.run("repair bad.sof e.ply").fails(&["bad.sof", "byte 6"]);
+    assert_eq!(folder.run("info bad.sof knot.ply").code, Some(1));
+    assert!(!folder.names().iter().any(|name| name.starts_with("e.") || name.ends_with("partial")));
+}
+
+#[test]
+fn scenes_come_and_go() {
+    let folder = Folder::new();
+    for format in ["glb", "3mf"] {
+        folder.run(&format!("repair knot.ply a.{format} -d 6 -s quads")).ok().says(&["a solid"]);
+        assert_solid(&folder.path(&format!("a.{format}")));
+        folder.run(&format!("repair a.{format} {format}.ply -d 6")).ok().says(&["a solid"]);
+        let json = folder.run(&format!("info a.{format} --json")).ok().json();
+        assert_eq!((&json["format"], &json["solid"]), (&format.into(), &true.into()));
+    }
+    folder.run("repair knot.ply a.gltf").fails(&["a.gltf", ".glb"]);
+    folder.run("sample knot b.glb").ok();
 }
 
 #[test]

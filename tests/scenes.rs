@@ -4,6 +4,7 @@ use flate2::write::DeflateEncoder;
 use glam::DVec3;
 use proptest::prelude::*;
 use std::io::Write;
+use std::sync::LazyLock;
 use zmend::Mesh;
 use zmend::io::{self, Format, Precision, WriteOptions};
 use zmend::mesh::sample;
@@ -12,7 +13,7 @@ use zmend::mesh::sample;
 fn mixed() -> Mesh {
     let at = |x: f64, y: f64, z: f64| DVec3::new(x / 3.0, y / 7.0, 1e3 + z);
     let points = vec![at(0., 0., 0.), at(4., 0., 0.), at(4., 4., 0.), at(2., 1., 0.), at(0., 4., 0.), at(0., 0., 1.)];
-    let faces: [&[u32]; 5] = [&[0, 1, 2, 3, 4], &[0, 1, 5], &[1, 2, 5], &[5], &[2, 4, 5, 3]];
+    let faces: [&[u32]; 5] = [&[0, 1, 2, 3, 4], &[0, 1, 5], &[1, 2, 5], &[5], &[0, 4, 2, 1]];
     Mesh { points, faces: faces.into_iter().collect() }
 }
 
@@ -56,10 +57,8 @@ fn meshes_come_back() {
         let nothing = read(&bytes_of(&Mesh::default(), format, Precision::Single)).expect("ours");
         assert!(nothing.points.is_empty() && nothing.faces.is_empty());
     }
-    assert_eq!(
-        io::read_bytes("t", b"{}", Some(Format::Gltf)).expect_err("no version").to_string().contains("version"),
-        true
-    );
+    let error = io::read_bytes("t", b"{}", Some(Format::Gltf)).expect_err("no version");
+    assert!(error.to_string().contains("version"), "{error}");
     let directory = tempfile::tempdir().expect("a directory");
     let refused = io::write(directory.path().join("x.gltf"), &mixed(), WriteOptions::default());
     assert!(refused.expect_err("only binary").to_string().contains(".glb"));
@@ -162,8 +161,8 @@ fn documents_that_make_no_sense_are_refused() {
     assert!(problem(&format!("{ACCESSORS},{wrong}")).contains("SCALAR"));
     assert!(problem(r#""x": 1e999"#).contains("JSON"));
     // One part a hundred thousand times.
-    let big = vec![0; 12 << 16];
-    let views = r#""bufferViews":[{"byteLength":786432}],"accessors":[{"bufferView":0,"componentType":5126,"count":65536,"type":"VEC3"}]"#;
+    let big = vec![0; 12 << 12];
+    let views = r#""bufferViews":[{"byteLength":49152}],"accessors":[{"bufferView":0,"componentType":5126,"count":4096,"type":"VEC3"}]"#;
     let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
     let exploding = document(&big, &format!(r#"{views},{simple},"nodes":[{nodes}]"#));
     assert!(read(&exploding).expect_err("too large").to_string().contains("too often"));
@@ -285,8 +284,8 @@ fn archives_that_make_no_sense_are_refused() {
     let cut = model(&object(TRIANGLE), "");
     assert!(problem(&archive(&[("a.model", &cut.as_bytes()[..cut.len() - 20])], true)).contains("a.model"));
     assert!(problem(&archive(&[("a.txt", b"x")], false)).contains("no 3D model"));
-    // A hundred megabytes of blanks in a hundred kilobytes.
-    let blanks = [model("", "").as_bytes(), &vec![b' '; 100 << 20]].concat();
+    // Blanks pack a thousandfold.
+    let blanks = [model("", "").as_bytes(), &vec![b' '; 24 << 20]].concat();
     let error = problem(&archive(&[("a.model", &blanks)], true));
     assert!(error.contains("hundred times"), "{error}");
 }
@@ -303,12 +302,14 @@ fn cut_files_are_errors() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(128))]
     /// Whatever a damaged file says, it is an error or a mesh.
     #[test]
     fn damaged_files_do_no_harm(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
-        for format in [Format::Glb, Format::ThreeMf] {
-            let mut bytes = bytes_of(&mixed(), format, Precision::Single);
+        static WHOLE: LazyLock<[Vec<u8>; 2]> =
+            LazyLock::new(|| [Format::Glb, Format::ThreeMf].map(|format| bytes_of(&mixed(), format, Precision::Single)));
+        for (format, whole) in [Format::Glb, Format::ThreeMf].into_iter().zip(&*WHOLE) {
+            let mut bytes = whole.clone();
             for (at, value) in &changes {
                 let i = at.index(bytes.len());
                 bytes[i] = *value;

@@ -21,7 +21,7 @@ use crate::grid::brick::Plane;
 use crate::grid::cases::Mask;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::crossings::Brick;
-use crate::octree::{SignedOctree, StoredPoints};
+use crate::octree::{Crossings, SignedOctree, StoredPoints};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
 use glam::DVec3;
@@ -92,19 +92,36 @@ pub fn dual_contouring(
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
-    let crossings = octree.crossings();
-    assert!(
-        !options.placement.needs_normals() || crossings.with_normals() || crossings.is_empty(),
-        "sharp features need normals"
-    );
+    check_normals(octree.crossings(), options);
     if options.intersections == Intersections::Avoid && options.placement != Placement::Centre {
         return disjoint_contouring(octree, frame, options, sink, progress);
     }
-    let bricks = crossings.bricks().len();
-    progress.begin(Stage::Contour, 2 * bricks as u64);
-    progress.hold((octree.bytes() + bricks * BRICK_BYTES) as u64)?;
+    progress.begin(Stage::Contour, 2 * octree.crossings().bricks().len() as u64);
+    progress.hold((octree.bytes() + octree.crossings().bricks().len() * BRICK_BYTES) as u64)?;
     let layout = Layout::new(octree, Style::Usual)?;
     let polygons = layout.extra_polygons();
+    contour(&layout, &polygons, frame, options, sink, progress)
+}
+
+/// # Panics
+/// When sharp features are asked for and there are no normals.
+pub(super) fn check_normals(crossings: &Crossings, options: &DualOptions<'_>) {
+    let has_normals = crossings.with_normals() || crossings.is_empty();
+    assert!(!options.placement.needs_normals() || has_normals, "sharp features need normals");
+}
+
+/// [`dual_contouring`] with a layout and its [extra polygons](Layout::extra_polygons) at hand, once the stage has begun, and whatever
+/// `options` says about intersections.
+pub(super) fn contour(
+    layout: &Layout<'_>,
+    polygons: &[(usize, Vec<u32>)],
+    frame: &Frame,
+    options: &DualOptions<'_>,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
+    let crossings = layout.octree.crossings();
+    let bricks = crossings.bricks().len();
     let (quads, extra_corners) = (crossings.len() as u64, polygons.iter().map(|p| p.1.len() as u64).sum::<u64>());
     let sizes = if options.triangles {
         let triangles = 2 * quads + extra_corners - 2 * polygons.len() as u64;
@@ -130,7 +147,7 @@ pub fn dual_contouring(
         count,
         progress,
         || CellTable::new(CellVertices::default()),
-        |table, n| layout.faces(&sharp, &polygons, options.triangles, table, piece(n)),
+        |table, n| layout.faces(&sharp, polygons, options.triangles, table, piece(n)),
         |faces| {
             progress.advance(PIECE as u64);
             faces.pass_on(sink)

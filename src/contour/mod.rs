@@ -7,6 +7,7 @@
 mod cubes;
 mod disjoint;
 mod dual;
+mod edited;
 mod envelope;
 mod knots;
 mod layout;
@@ -17,6 +18,7 @@ mod tests;
 
 pub use cubes::marching_cubes;
 pub use dual::{DualOptions, Intersections, Placement, dual_contouring};
+pub use edited::dual_contouring_edited;
 pub use points::CellVertices;
 
 /// Bricks of a piece: some five thousand cells, whose points and faces stay in the cache until they are taken.

@@ -76,6 +76,7 @@ fn surfaces_in(octree: &SignedOctree, frame: &Frame) -> Vec<Mesh> {
         dual(Placement::SharpFeatures, true, Intersections::Avoid),
         dual(Placement::SharpFeatures, false, Intersections::Avoid),
         dual(Placement::MassPoint, true, Intersections::Avoid),
+        dual(Placement::MassPoint, false, Intersections::Avoid),
     ]
 }
 
@@ -265,51 +266,45 @@ fn intersections_are_found() {
     assert_eq!(intersections(&flat([0.5, 0.5]), false).len(), 1);
 }
 
-/// Random signs round the common corner of eight bricks, with crossings and normals as random as can be.
+/// Random signs round the common corner of eight bricks, with crossings and normals as random as can be: surfaces that say so have no
+/// intersections, whichever way quadrilaterals are cut. Those that do not say so have thousands, or the test would mean little.
 #[test]
 fn nothing_intersects_that_should_not() {
-    let cases: u64 = std::env::var("ZMEND_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(600);
-    let bad: Vec<String> = (0..cases)
-        .into_par_iter()
-        .flat_map_iter(|seed| {
-            let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let mut chance = move || {
-                state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-                let z = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-                let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-                z ^ z >> 31
+    const MAY: [usize; 3] = [1, 2, 3];
+    let frame = Frame::new(DVec3::ZERO, 16.0, 4).unwrap();
+    let of_seed = |seed: u64| {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut chance = move || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let z = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+            z ^ z >> 31
+        };
+        let (signs, more) = (chance(), chance());
+        let signs = [signs, signs & more, signs | more][seed as usize % 3];
+        let inside = |p: [u32; 3]| {
+            let [x, y, z] = p.map(|c| c.wrapping_sub(6));
+            x < 4 && y < 4 && z < 4 && signs >> (16 * x + 4 * y + z) & 1 == 1
+        };
+        let octree = octree_of(4, inside, || {
+            let bits = chance();
+            // In three of four volumes half of the crossings are as near to lattice points as can be.
+            let offset = match (seed % 4, bits >> 60) {
+                (0, _) | (_, 0..8) => bits as u16,
+                (_, 8..12) => 0,
+                _ => u16::MAX,
             };
-            let (signs, more) = (chance(), chance());
-            let signs = match seed % 3 {
-                0 => signs,
-                1 => signs & more,
-                _ => signs | more,
-            };
-            let inside = |p: [u32; 3]| {
-                let [x, y, z] = p.map(|c| c.wrapping_sub(6));
-                x < 4 && y < 4 && z < 4 && signs >> (16 * x + 4 * y + z) & 1 == 1
-            };
-            let extreme = seed % 4;
-            let octree = octree_of(4, inside, || {
-                let bits = chance();
-                let offset = match (extreme, bits >> 60) {
-                    (0, _) | (_, 0..8) => bits as u16,
-                    (_, 8..12) => 0,
-                    _ => u16::MAX,
-                };
-                Sample::new(offset, (bits >> 16) as u16 % 0xff00)
-            });
-            let frame = Frame::new(DVec3::ZERO, 16.0, 4).unwrap();
-            check_with(&octree, &frame)
-                .into_iter()
-                .enumerate()
-                .filter(|(i, _)| ![1, 2, 3].contains(i))
-                .flat_map(move |(i, mesh)| {
-                    let found = [false, true].map(|second| intersections(&mesh, second).len());
-                    (found != [0, 0]).then(|| format!("seed {seed}, surface {i}: {found:?}"))
-                })
-                .collect::<Vec<_>>()
-        })
-        .collect();
-    assert!(bad.is_empty(), "{} of {cases}: {:#?}", bad.len(), &bad[..bad.len().min(20)]);
+            Sample::new(offset, (bits >> 16) as u16 % 0xff00)
+        });
+        let surfaces = check_with(&octree, &frame);
+        surfaces.iter().map(|mesh| [false, true].map(|second| intersections(mesh, second).len())).collect::<Vec<_>>()
+    };
+    let found: Vec<_> = (0..500).into_par_iter().map(of_seed).collect();
+    for (seed, surfaces) in found.iter().enumerate() {
+        for (i, found) in surfaces.iter().enumerate().filter(|(i, _)| !MAY.contains(i)) {
+            assert_eq!(found, &[0, 0], "seed {seed}, surface {i}");
+        }
+    }
+    let that_may: usize = found.iter().map(|surfaces| MAY.map(|i| surfaces[i][0]).iter().sum::<usize>()).sum();
+    assert!(that_may > 1000, "{that_may}");
 }

@@ -140,9 +140,13 @@ impl Projection {
         let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.half_plane(i, j, columns.0, rows.0));
         // Many small triangles pass between the lines: the rest is worked out at the first hit.
         let mut plane = None;
+        let mut look = ROWS;
         for row in 0..rows.1 - rows.0 {
-            if row % ROWS == ROWS - 1 && hits.is_enough() {
-                return;
+            if row == look {
+                look += ROWS;
+                if hits.is_enough() {
+                    return;
+                }
             }
             let (mut first, mut end) = (0, columns.1 - columns.0);
             for e in &edges {

@@ -6,7 +6,9 @@
 pub mod axis;
 pub mod brick;
 pub mod cases;
+pub mod flood;
 pub mod key;
+pub mod subcomplex;
 
 pub use axis::{Axis, Corner, Direction, Edge, Extent, Face};
 pub use key::Key;

@@ -6,6 +6,20 @@
 //! Readers take what exporters really write, and never panic, hang or allocate more than a small multiple of the file:
 //! they give a mesh with everything the file holds, or an error that names the place and the remedy.
 //!
+//! | format | names | read | written | needs |
+//! |---|---|---|---|---|
+//! | STL | `.stl` | binary (streamed) and text | both | |
+//! | PLY | `.ply` | binary (streamed) and text | both | |
+//! | OBJ | `.obj` | polygons | polygons | |
+//! | OFF | `.off` | polygons | polygons | |
+//! | glTF 2.0 | `.glb`, `.gltf` | triangles, strips and fans of the default scene | `.glb` | feature `gltf` |
+//! | 3MF | `.3mf` | all that is to be built | one object | feature `3mf` |
+//!
+//! Scenes of parts (glTF, 3MF) become one mesh, with the transforms of their nodes, items and components applied.
+//!
+//! Signed octrees in SOF, SOG and DCF files ([`OctreeFormat`]) come and go by [`read_octree`], [`write_sof`], [`write_sog`] and
+//! [`write_dcf`].
+//!
 //! ```
 //! use zmend::io;
 //!
@@ -30,6 +44,8 @@ mod off;
 mod ply;
 #[cfg(any(feature = "gltf", feature = "3mf"))]
 mod scene;
+pub mod skeleton;
+pub mod skt;
 mod stl;
 mod text;
 #[cfg(feature = "3mf")]

@@ -1,19 +1,25 @@
 //! Indexed polygons, and what can be said about them.
 
+mod chance;
+mod distance;
+mod intersect;
+mod meet;
 mod polygon;
 mod report;
 pub mod sample;
-mod sets;
 mod source;
 mod star;
 mod stream;
 mod tally;
+mod tree;
 mod validate;
 
+pub use distance::{Deviation, DistanceOptions, Distances};
 pub use polygon::triangulate;
 pub use report::Report;
 pub(crate) use source::Batch;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
+pub use tree::{Closest, TriangleTree};
 pub use validate::Violation;
 
 use glam::DVec3;

@@ -1,8 +1,8 @@
 //! The sums behind a report: over faces, and over points with the edges and faces of which they are the lowest.
 
-use super::sets::Sets;
 use super::star::{Corner, Star, Stars, repeated};
 use super::{Bounds, Mesh};
+use crate::sets::Sets;
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -168,7 +168,7 @@ impl CompactOctree {
     pub fn into_signed(self) -> SignedOctree {
         let CompactOctree { signs, offsets, normals } = self;
         let mut builder = Builder::new(signs.depth, signs.with_normals);
-        let (mut offsets, mut normals) = (offsets.into_iter(), normals.into_iter());
+        let (mut offsets, mut normals) = (offsets.into_reader(), normals.into_reader());
         let (mut of_offsets, mut of_normals): (Vec<u16>, Vec<u16>) = Default::default();
         let (count, piece) = pieces(signs.groups.len(), 8);
         let unpack = |(): &mut (), n| {
@@ -178,10 +178,8 @@ impl CompactOctree {
         let append = |bricks: Vec<(Key, [Plane; 3])>| {
             for (key, crossed) in bricks {
                 let count = crossed.iter().map(Plane::count).sum::<u32>() as usize;
-                of_offsets.clear();
-                of_offsets.extend(offsets.by_ref().take(count));
-                of_normals.clear();
-                of_normals.extend(normals.by_ref().take(count));
+                offsets.read(count, &mut of_offsets);
+                normals.read(count, &mut of_normals);
                 builder.push(key, crossed, &of_offsets, &of_normals);
             }
             Ok(())

@@ -257,7 +257,7 @@ impl Crossings {
     }
 
     /// The sample at a place of the arrays.
-    pub(super) fn sample_at(&self, place: usize) -> Sample {
+    pub(crate) fn sample_at(&self, place: usize) -> Sample {
         Sample { offset: self.offsets[place], normal: if self.with_normals { self.normals[place] } else { 0 } }
     }
 
@@ -330,11 +330,11 @@ impl Crossings {
             let at = lattice_point(depth, toggle.edge);
             Key::cell(depth - 3, at.map(|c| c >> 3)).expect("edges lie in bricks")
         };
-        let mut pending = toggles.chunk_by(|a, b| home(a) == home(b)).peekable();
+        let mut pending = toggles.chunk_by(|a, b| home(a) == home(b)).map(|list| (home(&list[0]), list)).peekable();
         let empty = |key| Brick { key, ..NOTHING.clone() };
         let mut builder = Builder::new(depth, with_normals);
         let (all_bricks, all_crossings) = (bricks.len(), offsets.len());
-        let (mut offsets, mut normals) = (offsets.into_iter(), normals.into_iter());
+        let (mut offsets, mut normals) = (offsets.into_reader(), normals.into_reader());
         let (mut of_offsets, mut of_normals) = (Vec::new(), Vec::new());
         for (i, brick) in bricks.into_iter().enumerate() {
             if i % 256 == 0 {
@@ -343,24 +343,59 @@ impl Crossings {
                 let old = (all_bricks - i) * size_of::<Brick>() + left * if with_normals { 4 } else { 2 };
                 progress.hold((old + toggle_bytes + builder.bytes()) as u64)?;
             }
-            while let Some(list) = pending.next_if(|list| home(&list[0]) < brick.key) {
-                builder.push_toggled(&empty(home(&list[0])), [&[], &[]], list);
+            while let Some((key, list)) = pending.next_if(|(key, _)| *key < brick.key) {
+                builder.push_toggled(&empty(key), [&[], &[]], list);
             }
-            let count = brick.count() as usize;
-            of_offsets.clear();
-            of_offsets.extend(offsets.by_ref().take(count));
-            of_normals.clear();
-            of_normals.extend(normals.by_ref().take(count));
-            match pending.next_if(|list| home(&list[0]) == brick.key) {
-                Some(list) => builder.push_toggled(&brick, [&of_offsets, &of_normals], list),
+            offsets.read(brick.count() as usize, &mut of_offsets);
+            normals.read(of_offsets.len(), &mut of_normals);
+            match pending.next_if(|(key, _)| *key == brick.key) {
+                Some((_, list)) => builder.push_toggled(&brick, [&of_offsets, &of_normals], list),
                 None => builder.push(brick.key, brick.crossed, &of_offsets, &of_normals),
             }
         }
-        for list in pending {
-            builder.push_toggled(&empty(home(&list[0])), [&[], &[]], list);
+        for (key, list) in pending {
+            builder.push_toggled(&empty(key), [&[], &[]], list);
         }
         drop(toggles);
         builder.finish_within(progress)
+    }
+
+    /// Only those crossings that `kept` names for each brick: none that is not there. Cost: linear.
+    #[must_use]
+    pub(crate) fn retained(&self, kept: impl Fn(usize) -> [Plane; 3] + Sync + Send) -> Crossings {
+        let planes: Vec<[Plane; 3]> = (0..self.bricks.len()).into_par_iter().map(kept).collect();
+        let mut builder = Builder::new(self.depth, self.with_normals);
+        let (mut offsets, mut normals) = (Vec::new(), Vec::new());
+        for (brick, kept) in self.bricks.iter().zip(planes) {
+            let mut place = brick.first as usize;
+            for (crossed, kept) in brick.crossed.iter().zip(&kept) {
+                for local in crossed.iter() {
+                    if kept.get(local) {
+                        let sample = self.sample_at(place);
+                        offsets.push(sample.offset);
+                        normals.push(sample.normal);
+                    }
+                    place += 1;
+                }
+            }
+            builder.push(brick.key, kept, &offsets, &normals);
+            offsets.clear();
+            normals.clear();
+        }
+        builder.finish()
+    }
+
+    /// The cells of a brick with a crossed edge: those that hold a piece of the surface.
+    pub(crate) fn mixed_cells(&self, brick: &Brick) -> Plane {
+        let [x, y, z] = &brick.crossed;
+        let [px, py, pz, pxy, pxz, pyz] = self.plus(brick).map(|b| &b.crossed);
+        let x = *x | x.at_plus_y(&py[0]);
+        let next_x = pz[0] | pz[0].at_plus_y(&pyz[0]);
+        let y = *y | y.at_plus_x(&px[1]);
+        let next_y = pz[1] | pz[1].at_plus_x(&pxz[1]);
+        let z = *z | z.at_plus_x(&px[2]);
+        let next_z = py[2] | py[2].at_plus_x(&pxy[2]);
+        x | x.at_plus_z(&next_x) | y | y.at_plus_z(&next_y) | z | z.at_plus_y(&next_z)
     }
 
     /// The first broken invariant, in words. Cost: linear, a few hash probes a brick.

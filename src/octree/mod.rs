@@ -22,6 +22,7 @@
 
 pub(crate) mod cells;
 pub mod compact;
+pub mod components;
 pub mod crossings;
 pub mod edited;
 pub mod hits;
@@ -29,7 +30,9 @@ mod locate;
 mod neighbour;
 #[cfg(test)]
 mod oracle;
+pub(crate) mod point_set;
 pub mod points;
+pub mod regions;
 pub mod segments;
 pub mod signed;
 mod traverse;

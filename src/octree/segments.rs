@@ -85,7 +85,38 @@ impl<T, const BITS: u32> IntoIterator for Segments<T, BITS> {
     }
 }
 
+/// Reads a list from its beginning; each segment is given back as soon as it is used up.
+#[derive(Debug)]
+pub struct Reader<T> {
+    segments: std::vec::IntoIter<Vec<T>>,
+    current: Vec<T>,
+    at: usize,
+}
+
+impl<T: Copy> Reader<T> {
+    /// Replaces what is in `out` by the next `count` elements, or as many as there are.
+    pub fn read(&mut self, mut count: usize, out: &mut Vec<T>) {
+        out.clear();
+        while count > 0 {
+            if self.at == self.current.len() {
+                let Some(next) = self.segments.next() else { return };
+                self.current = next;
+                self.at = 0;
+            }
+            let here = count.min(self.current.len() - self.at);
+            out.extend_from_slice(&self.current[self.at..self.at + here]);
+            self.at += here;
+            count -= here;
+        }
+    }
+}
+
 impl<T: Copy, const BITS: u32> Segments<T, BITS> {
+    /// The elements, to be read piece by piece.
+    pub fn into_reader(self) -> Reader<T> {
+        Reader { segments: self.segments.into_iter(), current: Vec::new(), at: 0 }
+    }
+
     /// Appends elements.
     pub fn extend_from_slice(&mut self, mut elements: &[T]) {
         while !elements.is_empty() {
@@ -135,6 +166,12 @@ mod tests {
         let before = list.allocated_bytes();
         list.shrink_to_fit();
         assert!(list.allocated_bytes() < before && list.iter().eq(list.range(0..1000)));
+        let (mut reader, mut part, mut at) = (list.clone().into_reader(), Vec::new(), 0);
+        for count in [0, 1, 15, 16, 17, 300, 651, 5] {
+            reader.read(count, &mut part);
+            assert!(list.range(at..1000.min(at + count)).eq(&part), "{at} {count}");
+            at += part.len();
+        }
         assert!(list.into_iter().skip(78).eq(plain[78..].iter().copied()));
     }
 }

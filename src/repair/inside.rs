@@ -2,13 +2,14 @@
 
 use super::options::Inside;
 use super::report::Clock;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::TriangleSource;
 use crate::octree::SignedOctree;
+use crate::octree::signed::SIGN_BYTES;
 use crate::progress::{Progress, Stage};
 use crate::sign::winding::{Circulation, Patches, WholeNumbers, circulations, winding_signs};
-use crate::sign::{Closing, OrientedScan, Scan, ScanCounts, close, parity_signs, scan, scan_oriented};
+use crate::sign::{Closing, OrientedScan, Scan, ScanCounts, close, parity_signs, scan, scan_oriented, vanished};
 use std::fmt;
 
 /// How inside was told from outside, and why so.
@@ -66,6 +67,8 @@ pub(super) struct Told {
     pub(super) choice: InsideChoice,
     /// Points at which the surface was clipped by the root.
     pub(super) clipped: u64,
+    /// Grid edges that faces cross where no solid ends.
+    pub(super) vanished: u64,
 }
 
 /// Scans the source and tells inside from outside.
@@ -96,21 +99,24 @@ pub(super) fn tell(
         return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, Reason::Sheet, clock, progress);
     }
     let odd_faces = boundary.iter().filter(|c| is_rim(c)).count() as u64;
-    let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.area() };
+    let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.area(), vanished: 0 };
     let winding = clock.time(Stage::Sign, || winding_signs(&scan.hits, &patches, progress))?;
     let reason = if asked { Reason::Asked } else { Reason::Open };
+    let vanished = vanished(&scan.hits, &winding.octree);
     let choice = InsideChoice { rule: Inside::Winding, reason, reversed: patches.reversed() };
-    Ok(Told { octree: winding.octree, counts: scan.counts, closing, choice, clipped: winding.clipped })
+    Ok(Told { octree: winding.octree, counts: scan.counts, closing, choice, clipped: winding.clipped, vanished })
 }
 
 fn by_parity(scan: Scan, reason: Reason, clock: &mut Clock, progress: &dyn Progress) -> Result<Told> {
     let (crossings, closing) = clock.time(Stage::Close, || close(scan.crossings, progress))?;
     let octree = clock.time(Stage::Sign, || {
         progress.begin(Stage::Sign, 0);
-        parity_signs(crossings)
-    });
+        progress.hold((crossings.bytes() + crossings.bricks().len() * SIGN_BYTES) as u64)?;
+        Ok::<_, Error>(parity_signs(crossings))
+    })?;
     let choice = InsideChoice { rule: Inside::Parity, reason, reversed: false };
-    Ok(Told { octree, counts: scan.counts, closing, choice, clipped: 0 })
+    let vanished = closing.vanished;
+    Ok(Told { octree, counts: scan.counts, closing, choice, clipped: 0, vanished })
 }
 
 /// Closed and oriented surfaces.
@@ -128,7 +134,7 @@ fn without_boundary(scan: OrientedScan, inside: Inside, clock: &mut Clock, progr
     };
     let octree = clock.time(Stage::Sign, || numbers.into_octree(scan.hits));
     let choice = InsideChoice { rule, reason, reversed: false };
-    Ok(Told { octree, counts: scan.counts, closing: Closing::default(), choice, clipped: 0 })
+    Ok(Told { octree, counts: scan.counts, closing: Closing::default(), choice, clipped: 0, vanished: 0 })
 }
 
 /// Whether an open end passes through a face, and not merely a seam between faces turned opposite ways.

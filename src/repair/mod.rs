@@ -1,20 +1,23 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod hull;
 mod inside;
 mod memory;
 mod options;
 mod report;
 mod solid;
 
+pub use crate::sign::{Keep, Kept, Thicken};
 pub use inside::{InsideChoice, Reason};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 pub use solid::Solid;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::progress::{Progress, Silent, Stage};
+use crate::sign::{check_gap, check_width, keep, thicken};
 use inside::{Told, tell};
 use memory::{Guard, GuardedSink};
 use report::Clock;
@@ -101,7 +104,9 @@ impl Begun {
         let mut clock = Clock::default();
         progress.begin(Stage::Read, 0);
         let bounds = clock.time(Stage::Read, || source.bounds())?;
-        Ok(Begun { bounds, frame: options.frame(&bounds)?, clock })
+        let frame = options.frame(&bounds)?;
+        check(options, &frame)?;
+        Ok(Begun { bounds, frame, clock })
     }
 }
 
@@ -118,8 +123,15 @@ fn mend(
     if bounds.is_empty() {
         warnings.push(Warning::NoFaces);
     }
-    let told = tell(source, &frame, options.surface.needs_normals(), options.inside, &mut clock, progress)?;
-    let Told { octree, counts, closing, choice, clipped } = told;
+    let told = match options.inside {
+        Inside::Hull => hull::tell(source, &frame, options, &mut clock, progress)?,
+        rule => tell(source, &frame, options.surface.needs_normals(), rule, &mut clock, progress)?,
+    };
+    let Told { mut octree, counts, closing, choice, clipped, vanished } = told;
+    if let Some(width) = options.thicken {
+        octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
+    }
+    let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
 
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
@@ -130,6 +142,7 @@ fn mend(
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
         (clipped, Warning::Clipped),
+        (if options.thicken.is_none() { percent(vanished, counts.hits) } else { 0 }, Warning::FacesVanished),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
     let report = RepairReport {
@@ -138,6 +151,8 @@ fn mend(
         scan: counts,
         closing,
         inside: choice,
+        vanished,
+        kept,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
@@ -147,4 +162,21 @@ fn mend(
         times: clock.times,
     };
     Ok((Solid { octree, frame, points: None }, report))
+}
+
+/// Refuses what can be told before anything is read.
+fn check(options: &Options, frame: &Frame) -> Result<()> {
+    options.keep.check()?;
+    if let Some(gap) = options.gap {
+        if options.inside != Inside::Hull {
+            return Err(Error::setting("gap", "only the hull has gaps that can be closed", "add `--inside hull`"));
+        }
+        check_gap(gap, frame)?;
+    }
+    options.thicken.map_or(Ok(()), |width| check_width(width, frame))
+}
+
+/// So many in a hundred, rounded.
+fn percent(part: u64, whole: u64) -> u64 {
+    (100 * part + whole / 2).checked_div(whole).unwrap_or(0)
 }

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::geom::{Cube, Frame};
 use crate::mesh::Bounds;
+use crate::sign::{Keep, Thicken};
 
 /// How to repair: `Options { depth: 9, ..Options::default() }`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +32,16 @@ pub struct Options {
     pub max_memory: Option<u64>,
     /// How inside is told from outside. Default [`Inside::Auto`].
     pub inside: Inside,
+    /// With [`Inside::Hull`]: gaps between faces are closed up to this width, in model units. Default none.
+    pub gap: Option<f64>,
+    /// Faces that bound nothing get a wall of this width, in model units. Default none: they vanish.
+    pub thicken: Option<f64>,
+    /// Which faces get that wall. Default [`Thicken::Sheets`].
+    pub thicken_what: Thicken,
+    /// Which solids stay. Default [`Keep::All`].
+    pub keep: Keep,
+    /// Whether cavities of solids are filled. Default no.
+    pub drop_cavities: bool,
 }
 
 impl Default for Options {
@@ -45,6 +56,11 @@ impl Default for Options {
             faces: Faces::default(),
             no_self_intersections: false,
             max_memory: None,
+            gap: None,
+            thicken: None,
+            thicken_what: Thicken::default(),
+            keep: Keep::default(),
+            drop_cavities: false,
         }
     }
 }
@@ -56,14 +72,21 @@ impl Options {
     /// When an option is out of range, and when the input does not fit into the cube.
     pub fn frame(&self, bounds: &Bounds) -> Result<Frame> {
         let unit = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE };
-        let model = if bounds.is_empty() { &unit } else { bounds };
+        let model = &self.with_room(if bounds.is_empty() { &unit } else { bounds });
         let frame = match (self.cube, self.cell) {
             (None, None) => return Frame::fit(model, self.depth, self.scale),
             (None, Some(cell)) => return Frame::fit_cells(model, cell, self.scale),
             (Some(cube), None) => Frame::new(cube.min, cube.size, self.depth)?,
             (Some(cube), Some(cell)) => Frame::with_cells(cube, cell)?,
         };
-        frame.check_holds(bounds).map(|()| frame)
+        frame.check_holds(&if bounds.is_empty() { *bounds } else { *model }).map(|()| frame)
+    }
+
+    /// Bounds with room for walls and for what closes gaps.
+    fn with_room(&self, bounds: &Bounds) -> Bounds {
+        let room = |width: Option<f64>| width.filter(|w| w.is_finite() && *w > 0.0).unwrap_or(0.0);
+        let margin = 0.5 * room(self.thicken).max(room(self.gap));
+        Bounds { min: bounds.min - margin, max: bounds.max + margin }
     }
 }
 
@@ -118,4 +141,8 @@ pub enum Inside {
     /// without walls in between; a cavity is one whose faces are turned to it. Holes are closed by a smooth surface, the generalised
     /// winding number of one half. See [`sign::winding`](crate::sign::winding).
     Winding,
+    /// Inside is what cannot be reached from infinity without passing through a face, whichever way faces are turned: the outer shell of
+    /// everything, without cavities. Holes and gaps let the outside in unless [`Options::gap`] closes them. See
+    /// [`sign::hull`](crate::sign::hull()).
+    Hull,
 }

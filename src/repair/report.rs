@@ -4,7 +4,7 @@ use super::inside::InsideChoice;
 use crate::geom::Frame;
 use crate::mesh::{Bounds, MeshSizes};
 use crate::progress::Stage;
-use crate::sign::{Closing, ScanCounts};
+use crate::sign::{Closing, Kept, ScanCounts};
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,10 @@ pub struct RepairReport {
     pub closing: Closing,
     /// How inside was told from outside.
     pub inside: InsideChoice,
+    /// Grid edges that faces cross where no solid ends: of open sheets and of walls within solids.
+    pub vanished: u64,
+    /// Which solids stayed, if any were to be dropped or filled.
+    pub kept: Kept,
     /// Grid edges that the final surface crosses.
     pub crossings: u64,
     /// Bricks of 8 x 8 x 8 cells that the octree holds.
@@ -52,6 +56,8 @@ pub enum Warning {
     OutsideTriangles(u64),
     /// The input has holes, and so many rings of cells were filled.
     HolesClosed(u64),
+    /// About so many percent of the surface bound no solid and vanished.
+    FacesVanished(u64),
     /// On so many grid edges, coincident walls were counted as one.
     WallsMerged(u64),
     /// At so many points of the grid the surface reached the grid's boundary and was clipped.
@@ -79,6 +85,10 @@ impl fmt::Display for Warning {
             Warning::Clipped(n) => write!(
                 f,
                 "the surface runs out of the grid and was clipped there (grid points concerned: {n}); try a smaller scale, or parity"
+            ),
+            Warning::FacesVanished(n) => write!(
+                f,
+                "about {n} % of the input's surface bounds no solid and vanished; --thicken WIDTH gives open sheets a wall"
             ),
             Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (grid edges concerned: {n})"),
         }

@@ -280,6 +280,10 @@ impl Resolved {
     }
 }
 
+/// The part of the memory of resolved hits that is found again by the allocator; the rest lies in small pieces between hits that still
+/// wait. A cube at depth 11 has 163 MB of hits and 125 MB of crossings, and 210 MB are held when all is resolved.
+const REUSED: [u64; 2] = [3, 8];
+
 /// Resolves all blocks and passes them on in order; `push` returns the bytes that it holds then.
 fn resolve<const ORIENTED: bool>(
     Collected { blocks, mut held }: Collected,
@@ -300,7 +304,7 @@ fn resolve<const ORIENTED: bool>(
         Resolved { freed, ..resolve_block::<ORIENTED>(block, hits, repeated, depth, with_normals) }
     };
     let append = |block: Resolved| {
-        held -= block.freed;
+        held -= block.freed / REUSED[1] * REUSED[0];
         let bytes = push(block)?;
         progress.hold(held + bytes)
     };

@@ -64,11 +64,8 @@ pub(crate) fn check(path: &Path, inputs: &[&Path], force: bool) -> Result<()> {
 pub(crate) fn format(path: &Path, asked: Option<GoalFormat>) -> Result<GoalFormat> {
     let octree = || OctreeFormat::from_path(path).map(GoalFormat::Octree);
     asked.or_else(octree).or_else(|| Format::from_path(path).map(GoalFormat::Mesh)).ok_or_else(|| {
-        refuse(
-            path,
-            "the name says no format to write",
-            "give it a name that ends in one that `zmend help repair` lists",
-        )
+        let remedy = "give it a name that ends in .stl, .ply, .obj, .off, .glb, .3mf, .sof, .sog or .dcf";
+        refuse(path, "the name says no format to write", remedy)
     })
 }
 

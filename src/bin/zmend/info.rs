@@ -1,7 +1,7 @@
 //! `zmend info`: what a mesh is and what is wrong with it.
 
 use crate::args::InfoArgs;
-use crate::measure::{Measured, Side};
+use crate::measure::{Loaded, Measured, Side};
 use crate::print::{self, Table};
 use crate::units::{real, vector};
 use crate::{json, units};
@@ -9,12 +9,23 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use zmend::Result;
-use zmend::io::{self, Format, InputInfo};
+use zmend::io::{self, Format, InputInfo, OctreeFormat};
+use zmend::progress::Silent;
 
 pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     let mut code = ExitCode::SUCCESS;
     for (i, path) in args.files.iter().enumerate() {
-        match look(path) {
+        if let Some(result) = look_at_octree(path, args.json).transpose() {
+            match result {
+                Ok(text) => print::out(&if i > 0 && !args.json { format!("\n{text}") } else { text })?,
+                Err(error) => {
+                    print::error(&error);
+                    code = ExitCode::FAILURE;
+                }
+            }
+            continue;
+        }
+        match look(path, args.quick) {
             Ok((info, measured)) if args.json => print::out(&as_json(&info, measured))?,
             Ok((info, measured)) => {
                 let gap = if i > 0 { "\n" } else { "" };
@@ -30,10 +41,38 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     Ok(code)
 }
 
-fn look(path: &Path) -> Result<(InputInfo, Measured)> {
-    let input = io::open(path)?;
-    let measured = Measured::input(&input)?;
-    Ok((input.info().clone(), measured))
+fn look(path: &Path, quick: bool) -> Result<(InputInfo, Measured)> {
+    let file = Loaded::open(path)?;
+    Ok((file.info().clone(), file.measured(quick)))
+}
+
+/// What is to be said of an octree file; `None` of others.
+fn look_at_octree(path: &Path, is_json: bool) -> Result<Option<String>> {
+    if OctreeFormat::of_file(path).ok().flatten().is_none() {
+        return Ok(None);
+    }
+    let file = io::read_octree(path, &Silent)?;
+    let (info, frame) = (&file.info, &file.frame);
+    if is_json {
+        let solid = json::octree_file(info);
+        return Ok(Some(format!("{}\n", json::merged(solid, json::grid(frame)))));
+    }
+    let cells = units::count(1 << info.depth);
+    let mut text = format!("{}: {} of {cells} cells a side\n", info.path.display(), info.format);
+    let mut table = Table::default();
+    table.line("surface cells", &[Some(units::count(info.surface_cells))]);
+    table.line("empty nodes", &[Some(units::count(info.empty_cells))]);
+    table.line("crossed edges", &[Some(units::count(file.octree.crossings().len() as u64))]);
+    table.line("volume", &[Some(real(file.octree.volume() * frame.cell_size().powi(3)))]);
+    table.line("size of the file", &[Some(units::bytes(info.bytes))]);
+    let (corner, side, cell) = (vector(frame.origin()), real(frame.size()), real(frame.cell_size()));
+    let _ = writeln!(text, "{table}  a cube of side {side} at {corner}, with cells of {cell}");
+    if info.trailing_bytes > 0 {
+        let ignored = units::counted(info.trailing_bytes, "byte", "bytes");
+        let _ = writeln!(text, "  {ignored} behind the end of the octree mean nothing");
+    }
+    let _ = writeln!(text, "to make a surface of it: zmend repair {} OUT", info.path.display());
+    Ok(Some(text))
 }
 
 fn as_json(info: &InputInfo, measured: Measured) -> String {

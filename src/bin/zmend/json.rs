@@ -1,9 +1,11 @@
-//! Results as JSON, for scripts. Lengths, areas and volumes are in model units; unknown values are null.
+//! Results as JSON, for scripts. Lengths, areas and volumes are in model units; unknown values are null. Self-intersections
+//! are counted up to a limit, and one more than the limit stands for all beyond.
 
-use crate::measure::{Measured, Side};
+use crate::measure::{Crossings, Measured, Side};
 use glam::DVec3;
 use serde_json::{Value, json};
-use zmend::io::InputInfo;
+use zmend::geom::Frame;
+use zmend::io::{InputInfo, OctreeInfo};
 use zmend::mesh::{Bounds, Report};
 
 /// All numbers of a mesh; the same fields whether it was measured or not.
@@ -35,6 +37,7 @@ pub(crate) fn side(side: &Side) -> Value {
         "degenerate_faces": r.map(|r| r.degenerate_faces),
         "zero_area_faces": r.map(|r| r.zero_area_faces),
         "duplicate_faces": r.map(|r| r.duplicate_faces),
+        "self_intersections": measured.and_then(|m| m.crossings).map(Crossings::least),
         "euler": r.map(|r| r.euler).or(side.euler),
         "genus": r.and_then(|r| r.genus),
         "volume": r.map(|r| r.volume).or(side.volume),
@@ -54,6 +57,33 @@ pub(crate) fn file(info: &InputInfo) -> Value {
         "encoding": info.encoding.to_string(),
         "streamed": info.is_streamed,
         "trailing_bytes": info.trailing_bytes,
+    })
+}
+
+/// What is known of an octree file.
+pub(crate) fn octree_file(info: &OctreeInfo) -> Value {
+    json!({
+        "path": info.path.display().to_string(),
+        "format": info.format.extension(),
+        "bytes": info.bytes,
+        "depth": info.depth,
+        "surface_cells": info.surface_cells,
+        "uniform_surface_cells": info.surface_cells_inside + info.surface_cells_outside,
+        "empty_cells": info.empty_cells,
+        "missing_samples": info.missing_samples,
+        "trailing_bytes": info.trailing_bytes,
+    })
+}
+
+/// Where a grid lies.
+pub(crate) fn grid(frame: &Frame) -> Value {
+    json!({
+        "grid": {
+            "origin": vector(frame.origin()),
+            "size": frame.size(),
+            "cell_size": frame.cell_size(),
+            "cells_a_side": 1u64 << frame.depth(),
+        },
     })
 }
 

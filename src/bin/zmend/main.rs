@@ -2,6 +2,7 @@
 
 mod args;
 mod bars;
+mod compare;
 mod digits;
 mod goal;
 mod info;
@@ -44,6 +45,7 @@ fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Repair(args) => repair::run(args),
         Command::Info(args) => info::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Render(args) => render::run(args),
     }

@@ -6,16 +6,82 @@ use zmend::io::{self, Input, InputInfo};
 use zmend::mesh::{Report, Violation};
 use zmend::{Mesh, Result};
 
+/// A file whose mesh is in memory.
+pub(crate) struct Loaded {
+    input: Input,
+    /// The mesh, if the input does not hold it.
+    mesh: Option<Mesh>,
+}
+
+impl Loaded {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let input = io::open(path)?;
+        // What came through a pipe is in memory, and cannot be read again.
+        let mesh = if input.mesh().is_none() { Some(io::read(path)?) } else { None };
+        Ok(Loaded { input, mesh })
+    }
+
+    pub(crate) fn info(&self) -> &InputInfo {
+        self.input.info()
+    }
+
+    pub(crate) fn mesh(&self) -> &Mesh {
+        self.mesh.as_ref().or(self.input.mesh()).expect("one of both holds it")
+    }
+
+    /// Measures the mesh and looks for self-intersections, unless in a hurry.
+    pub(crate) fn measured(&self, quick: bool) -> Measured {
+        let crossings = (!quick).then(|| Crossings::of(self.mesh()));
+        Measured { crossings, ..Measured::of(self.mesh()) }
+    }
+}
+
 /// A mesh, measured.
 pub(crate) struct Measured {
     pub(crate) report: Report,
     /// The first reason why it is not the surface of a solid.
     pub(crate) violation: Option<Violation>,
+    /// Self-intersections, where they were looked for.
+    pub(crate) crossings: Option<Crossings>,
+}
+
+/// The most self-intersections that are counted: bad meshes have billions.
+const MOST_CROSSINGS: usize = 1_000_000;
+
+/// How many pairs of faces meet where they should not.
+#[derive(Clone, Copy)]
+pub(crate) enum Crossings {
+    /// So many.
+    Pairs(u64),
+    /// More than this.
+    More(u64),
+}
+
+impl Crossings {
+    fn of(mesh: &Mesh) -> Self {
+        let pairs = mesh.self_intersections_up_to(MOST_CROSSINGS);
+        pairs.map_or(Crossings::More(MOST_CROSSINGS as u64), |pairs| Crossings::Pairs(pairs.len() as u64))
+    }
+
+    /// How many there are at least.
+    pub(crate) fn least(self) -> u64 {
+        match self {
+            Crossings::Pairs(n) => n,
+            Crossings::More(n) => n + 1,
+        }
+    }
+
+    fn words(self) -> String {
+        match self {
+            Crossings::Pairs(n) => count(n),
+            Crossings::More(n) => format!("over {}", count(n)),
+        }
+    }
 }
 
 impl Measured {
     pub(crate) fn of(mesh: &Mesh) -> Self {
-        Measured { report: mesh.report(), violation: mesh.validate().err() }
+        Measured { report: mesh.report(), violation: mesh.validate().err(), crossings: None }
     }
 
     /// Reads a file and measures what it holds.
@@ -41,7 +107,9 @@ impl Measured {
         }
         let Some(violation) = self.violation else {
             let inside_out = if r.volume < 0.0 { ", but inside out: its faces look inwards" } else { ": a solid" };
-            return format!("closed, manifold, oriented{inside_out}");
+            let crosses = self.crossings.is_some_and(|crossings| crossings.least() > 0);
+            let crossing = if crosses { ", but it passes through or touches itself" } else { "" };
+            return format!("closed, manifold, oriented{inside_out}{crossing}");
         };
         let rims = counted(r.boundary_edges, "boundary edge", "boundary edges");
         let problems = [
@@ -102,6 +170,7 @@ impl Side {
             ("degenerate faces", number(|r| r.degenerate_faces)),
             ("faces without area", rare(|r| r.zero_area_faces)),
             ("duplicate faces", number(|r| r.duplicate_faces)),
+            ("self-intersections", self.measured.as_ref().and_then(|m| m.crossings).map(Crossings::words)),
             ("Euler characteristic", report.map(|r| r.euler).or(self.euler).map(signed)),
             ("genus", report.and_then(|r| r.genus).map(signed)),
             ("volume", volume.map(real)),

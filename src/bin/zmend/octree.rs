@@ -5,6 +5,7 @@ use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
 use crate::repair::{self, Bounded, after};
+use crate::summary::surface_name;
 use crate::{digits, interrupt, json, memory, print, units};
 use serde_json::{Map, Value, json};
 use std::process::ExitCode;
@@ -131,13 +132,12 @@ impl Outcome<'_> {
             Source::Octree(info) => {
                 let ignored = units::counted(info.trailing_bytes, "byte", "bytes");
                 let missing = units::counted(info.missing_samples, "crossed edge", "crossed edges");
-                let of_mesh =
-                    matches!(self.to, GoalFormat::Mesh(_)) || self.to != GoalFormat::Octree(OctreeFormat::Sof);
+                let says_where = self.to != GoalFormat::Octree(OctreeFormat::Sof);
                 let half_way = "SOF files do not say where the surface crosses edges: it is taken to do so half way";
                 let warnings = [
                     (info.trailing_bytes > 0, format!("{ignored} behind the end of the octree were ignored")),
                     (info.missing_samples > 0, format!("{missing} had no sample and are crossed half way")),
-                    (info.format == OctreeFormat::Sof && of_mesh, half_way.to_owned()),
+                    (info.format == OctreeFormat::Sof && says_where, half_way.to_owned()),
                 ];
                 warnings.into_iter().filter(|(is_so, _)| *is_so).map(|(_, warning)| warning).collect()
             }
@@ -147,17 +147,6 @@ impl Outcome<'_> {
     fn surface_cells(&self) -> u64 {
         let bricks = 0..self.solid.octree.crossings().bricks().len();
         bricks.map(|i| u64::from(self.solid.octree.mixed_cells(i).count())).sum()
-    }
-
-    fn verdict(&self, after: Option<&Side>) -> String {
-        match after {
-            None => "an octree file: `zmend repair` makes a surface of it".to_owned(),
-            Some(side) if side.faces == 0 => "empty".to_owned(),
-            Some(side) => side.measured.as_ref().map_or_else(
-                || "closed, manifold, oriented: by construction; --report full measures it".to_owned(),
-                Measured::verdict,
-            ),
-        }
     }
 
     fn as_text(&self, after: Option<&Side>) -> String {
@@ -174,7 +163,7 @@ impl Outcome<'_> {
         let times: Vec<String> =
             self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
         let memory = self.peak_memory.map_or(String::new(), |bytes| format!(", {} of memory", units::bytes(bytes)));
-        let (times, verdict) = (times.join(", "), self.verdict(after));
+        let (times, verdict) = (times.join(", "), verdict(after));
         format!(
             "{input} -> {goal}: {to} on a grid of {cells} cells a side, each {cell} wide\n\n{table}\n{times}{memory}\n{verdict}\n"
         )
@@ -183,17 +172,10 @@ impl Outcome<'_> {
     fn as_json(&self, after: Option<&Side>, warnings: &[String]) -> Value {
         let Outcome { args, to, options, solid, source, .. } = self;
         let input = match source {
-            Source::Mesh(report) => json!({ "polygons": report.scan.source.polygons }),
-            Source::Octree(info) => json!({
-                "format": info.format.extension(),
-                "bytes": info.bytes,
-                "cells_a_side": 1u64 << info.depth,
-                "surface_cells": info.surface_cells,
-                "uniform_surface_cells": info.surface_cells_inside + info.surface_cells_outside,
-                "empty_cells": info.empty_cells,
-                "missing_samples": info.missing_samples,
-                "trailing_bytes": info.trailing_bytes,
-            }),
+            Source::Mesh(report) => {
+                json!({ "path": args.input.display().to_string(), "polygons": report.scan.source.polygons })
+            }
+            Source::Octree(info) => json::octree_file(info),
         };
         let output =
             json!({ "path": args.goal().display().to_string(), "format": to.extension(), "bytes": self.bytes });
@@ -201,18 +183,13 @@ impl Outcome<'_> {
             self.times.iter().map(|&(name, time)| (name.to_owned(), json!(time.as_secs_f64()))).collect();
         json!({
             "version": env!("CARGO_PKG_VERSION"),
-            "input": json::merged(json!({ "path": args.input.display().to_string() }), input),
+            "input": input,
             "output": match after {
-                Some(side) => json::merged(json::side(side), json::merged(output, json!({ "verdict": self.verdict(after) }))),
+                Some(side) => json::merged(json::side(side), json::merged(output, json!({ "verdict": verdict(after) }))),
                 None => output,
             },
-            "options": { "surface": name(options.surface), "threads": rayon::current_num_threads() },
-            "grid": {
-                "origin": json::vector(solid.frame.origin()),
-                "size": solid.frame.size(),
-                "cell_size": solid.frame.cell_size(),
-                "cells_a_side": 1u64 << solid.frame.depth(),
-            },
+            "options": { "surface": surface_name(options.surface), "threads": rayon::current_num_threads() },
+            "grid": json::grid(&solid.frame)["grid"],
             "octree": {
                 "surface_cells": self.surface_cells(),
                 "crossings": solid.octree.crossings().len(),
@@ -226,6 +203,14 @@ impl Outcome<'_> {
     }
 }
 
-fn name(surface: Surface) -> &'static str {
-    crate::summary::surface_name(surface)
+/// What came out, in words.
+fn verdict(after: Option<&Side>) -> String {
+    match after {
+        None => "an octree file: `zmend repair` makes a surface of it".to_owned(),
+        Some(side) if side.faces == 0 => "empty".to_owned(),
+        Some(side) => side.measured.as_ref().map_or_else(
+            || "closed, manifold, oriented: by construction; --report full measures it".to_owned(),
+            Measured::verdict,
+        ),
+    }
 }

@@ -24,9 +24,8 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[&args.input], args.write.force)?;
     let from = OctreeFormat::of_file(&args.input)?;
-    let format = match (from, format) {
-        (None, GoalFormat::Mesh(format)) => format,
-        _ => return octree::run(args, from, format),
+    let (None, GoalFormat::Mesh(format)) = (from, format) else {
+        return octree::run(args, from, format);
     };
     let mut options = options(args);
     if format.has_only_triangles() {
@@ -93,6 +92,11 @@ pub(crate) fn options(args: &RepairArgs) -> Options {
         scale: args.grid.scale,
         cube: args.grid.cube(),
         inside: args.inside.rule.into(),
+        gap: args.inside.gap,
+        thicken: args.inside.thicken,
+        thicken_what: args.inside.thicken_what.into(),
+        keep: args.inside.keep,
+        drop_cavities: args.inside.drop_cavities,
         surface: args.surface.kind.into(),
         faces: args.surface.faces.into(),
         no_self_intersections: args.surface.no_self_intersections,

@@ -7,7 +7,8 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::Duration;
 use zmend::io::{Format, InputInfo, Precision};
-use zmend::{Inside, Options, RepairReport, Result, Surface};
+use zmend::repair::Kept;
+use zmend::{Inside, Keep, Options, RepairReport, Result, Surface};
 
 /// All that a repair has to tell.
 pub(crate) struct Summary<'a> {
@@ -46,6 +47,7 @@ impl Summary<'_> {
         ))?;
         let choice = &self.report.inside;
         print::out(&format!("inside by {}: {}\n", inside_name(choice.rule), choice.reason))?;
+        self.dropped().map_or(Ok(()), |dropped| print::out(&format!("{dropped}\n")))?;
         self.warnings().iter().for_each(print::warning);
         let seconds: Vec<String> =
             self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
@@ -76,8 +78,14 @@ impl Summary<'_> {
                 "box": self.options.cube.map(|cube| json!({ "min": json::vector(cube.min), "size": cube.size })),
                 "max_memory": self.options.max_memory,
                 "inside": inside_name(self.options.inside),
+                "gap": self.options.gap,
+                "thicken": self.options.thicken,
+                "thicken_what": format!("{:?}", self.options.thicken_what).to_lowercase(),
+                "keep": keep_name(self.options.keep),
+                "drop_cavities": self.options.drop_cavities,
                 "surface": surface_name(self.options.surface),
                 "faces": format!("{:?}", self.options.faces).to_lowercase(),
+                "no_self_intersections": self.options.no_self_intersections,
                 "threads": rayon::current_num_threads(),
             },
             "grid": {
@@ -103,7 +111,9 @@ impl Summary<'_> {
                 "rule": inside_name(self.report.inside.rule),
                 "reason": self.report.inside.reason.to_string(),
                 "reversed": self.report.inside.reversed,
+                "vanished_edges": self.report.vanished,
             },
+            "components": self.components(),
             "octree": {
                 "crossings": self.report.crossings,
                 "bricks": self.report.bricks,
@@ -115,6 +125,42 @@ impl Summary<'_> {
             "peak_memory_bytes": self.peak_memory,
         });
         print::out(&format!("{all}\n"))
+    }
+
+    /// What became of solids and cavities, if they were counted.
+    fn components(&self) -> Value {
+        let Kept { solids, dropped_solids, dropped_cells, cavities, filled_cavities, filled_cells } = self.report.kept;
+        if !self.counts_components() {
+            return Value::Null;
+        }
+        json!({
+            "solids": solids,
+            "dropped_solids": dropped_solids,
+            "dropped_volume": self.volume(dropped_cells),
+            "cavities": cavities,
+            "filled_cavities": filled_cavities,
+            "filled_volume": self.volume(filled_cells),
+        })
+    }
+
+    /// The same in words.
+    fn dropped(&self) -> Option<String> {
+        let kept = self.report.kept;
+        let solids = format!("{} of {} dropped", kept.dropped_solids, units::counted(kept.solids, "solid", "solids"));
+        let cavities =
+            format!("{} of {} filled", kept.filled_cavities, units::counted(kept.cavities, "cavity", "cavities"));
+        let volume = |cells| units::real(self.volume(cells));
+        self.counts_components().then(|| {
+            format!("{solids} (volume {}), {cavities} ({})", volume(kept.dropped_cells), volume(kept.filled_cells))
+        })
+    }
+
+    fn counts_components(&self) -> bool {
+        self.options.keep != Keep::All || self.options.drop_cavities
+    }
+
+    fn volume(&self, cells: u64) -> f64 {
+        cells as f64 * self.report.frame.cell_size().powi(3)
     }
 
     /// What the result is, in words.
@@ -147,6 +193,15 @@ impl Summary<'_> {
             warnings.push(format!("the written file is not the surface of a solid: {}{remedy}", measured.verdict()));
         }
         warnings
+    }
+}
+
+fn keep_name(keep: Keep) -> Value {
+    match keep {
+        Keep::All => json!("all"),
+        Keep::Largest => json!("largest"),
+        Keep::Ratio(ratio) => json!(ratio),
+        Keep::Count(count) => json!(count),
     }
 }
 

@@ -184,12 +184,14 @@ impl<'a> Document<'a> {
             let scene = self.number(&self.json, "scene")?.unwrap_or(0);
             return self.references(self.item("scenes", scene)?, "nodes");
         }
-        let mut roots: Vec<u64> = (0..self.list("nodes").len() as u64).collect();
+        let mut is_child = vec![false; self.list("nodes").len()];
         for node in self.list("nodes") {
-            let children = self.references(node, "children")?;
-            roots.retain(|root| !children.contains(root));
+            for child in self.references(node, "children")? {
+                self.item("nodes", child)?;
+                is_child[child as usize] = true;
+            }
         }
-        Ok(roots)
+        Ok((0u64..).zip(is_child).filter(|(_, is_child)| !is_child).map(|(node, _)| node).collect())
     }
 
     /// The numbers in a list of an object.

@@ -26,6 +26,9 @@ use zip::Archive;
 /// Objects within objects within objects; more is taken for a circle.
 const DEEPEST: usize = 64;
 
+/// How many points a component counts for, even where it has none: that is how long it takes.
+const PER_COMPONENT: u64 = 16;
+
 /// The most bytes that an archive of so many bytes may unpack to: coordinates as text pack to a fifth or a tenth.
 fn most_unpacked(bytes: usize) -> u64 {
     (1 << 24) + 100 * bytes as u64
@@ -122,7 +125,7 @@ impl Package<'_> {
                 Err(self.error(problem, "export the file again"))
             }
             Shape::Components(components) => {
-                scene.spend(components.len() as u64)?;
+                scene.spend(PER_COMPONENT * components.len() as u64)?;
                 let components = components.clone();
                 components.iter().try_for_each(|component| self.add(&path, component, &transform, depth + 1, scene))
             }

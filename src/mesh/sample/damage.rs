@@ -1,34 +1,8 @@
 //! Ways to break a mesh, the same each time.
 
+use crate::mesh::chance::Chance;
 use crate::mesh::{Mesh, Polygons};
 use glam::DVec3;
-
-/// Steele, Lea and Flood 2014 ("splitmix64"): enough chance for samples, in three lines.
-pub(super) struct Chance(pub(super) u64);
-
-impl Chance {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Evenly spread over `0 .. 1`.
-    pub(super) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Evenly spread over a cube around the origin.
-    pub(super) fn within_cube(&mut self, half_side: f64) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()).map(|x| half_side * (2.0 * x - 1.0))
-    }
-
-    /// Whether something with this probability happens now.
-    pub(super) fn happens(&mut self, probability: f64) -> bool {
-        self.unit() < probability
-    }
-}
 
 /// Removes faces; the points stay.
 pub(super) fn without(mesh: &Mesh, mut remove: impl FnMut(usize, DVec3) -> bool) -> Mesh {

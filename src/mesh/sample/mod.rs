@@ -4,8 +4,9 @@ mod damage;
 mod shape;
 
 use super::Mesh;
+use super::chance::Chance;
 use crate::error::{Error, Result};
-use damage::{Carelessness, Chance, careless, without, without_loose_points};
+use damage::{Carelessness, careless, without, without_loose_points};
 use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot, IVec3};
 use shape::{arc, band, cells, cylinder, extrude, hole, moved, sphere, together, triangles, tube, wrapped};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

@@ -46,6 +46,8 @@ pub struct Closing {
     pub rings: u64,
     /// Edges that were switched.
     pub switched: u64,
+    /// Edges that faces cross and that were switched off: of open sheets, which are closed onto themselves and vanish, all.
+    pub vanished: u64,
 }
 
 /// Switches edges until no face is odd, so that any input gets an inside.
@@ -67,9 +69,13 @@ pub fn close(crossings: Crossings, progress: &dyn Progress) -> Result<(Crossings
     let exits = exits.collect();
     drop(odd);
     let (switches, rings) = fill(&crossings, exits, held, progress)?;
-    let toggles: Vec<Toggle> =
+    let mut toggles: Vec<Toggle> =
         switches.into_iter().map(|Switch { edge, sample, .. }| Toggle { edge, sample }).collect();
-    let closing = Closing { odd_faces, rings, switched: toggles.len() as u64 };
+    let mut closing = Closing { odd_faces, rings, ..Closing::default() };
+    closing.switched = toggles.len() as u64;
+    toggles.par_sort_unstable();
+    let once = toggles.par_chunk_by(|a, b| a.edge == b.edge).filter(|same| same.len() % 2 == 1);
+    closing.vanished = once.filter(|same| crossings.is_crossed(same[0].edge)).count() as u64;
     let crossings = crossings.toggled_within(toggles, progress)?;
     debug_assert_eq!(crossings.count_odd_faces(), 0, "filling all rings leaves no odd face");
     Ok((crossings, closing))

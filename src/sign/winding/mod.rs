@@ -29,6 +29,7 @@ mod field;
 mod levels;
 mod net;
 mod open;
+mod relax;
 mod samples;
 mod sources;
 mod whole;

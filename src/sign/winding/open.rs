@@ -1,8 +1,9 @@
 //! Winding numbers of surfaces with boundary.
 
 use super::circulation::Circulation;
-use super::field::{self, Dipole, Field, Values};
+use super::field::{self, Dipole, Field};
 use super::levels::{Counter, Layer, Rows, Steps};
+use super::relax::{UNIT, Values};
 use super::samples::{Rule, push_samples};
 use super::whole::steps_of;
 use super::world;
@@ -244,7 +245,7 @@ impl Layer<Plane> for Above<'_> {
             return;
         };
         let numbers = counter.values();
-        let bit = |line: usize| u64::from(is_inside(numbers[line], values[64 * x + line]));
+        let bit = |line: usize| u64::from(is_inside(numbers[line], f32::from(values[64 * x + line]) / UNIT));
         self.inside.0[x] = (0..64).fold(0, |word, line| word | bit(line) << line);
     }
 

@@ -1,9 +1,12 @@
 //! What can be said on the command line.
 
+mod compare;
 mod repair;
 mod values;
 
+pub(crate) use compare::CompareArgs;
 pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg};
+pub(crate) use values::Limit;
 
 use repair::GridArgs;
 
@@ -14,8 +17,8 @@ use values::{degrees, detail_range, size};
 
 /// Repairs polygon meshes: any soup of polygons in, a closed, manifold, oriented surface out.
 ///
-/// Holes are closed, and flipped, doubled, missing and loose faces do not matter. Files are STL, PLY, OBJ or OFF; what they
-/// contain says which, not their names.
+/// Holes are closed, and flipped, doubled, missing and loose faces do not matter. Files are STL, PLY, OBJ, OFF,
+/// glTF, GLB or 3MF; what they contain says which, not their names.
 #[derive(Debug, Parser)]
 #[command(
     name = "zmend",
@@ -26,6 +29,7 @@ Examples:
   zmend sample knot-holes broken.ply          write a broken mesh to try
   zmend info broken.ply                       what is wrong with it
   zmend repair broken.ply fixed.ply           repair it
+  zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
 `zmend help COMMAND` tells more."
@@ -55,6 +59,7 @@ pub(crate) fn parse() -> Args {
 pub(crate) enum Command {
     Repair(RepairArgs),
     Info(InfoArgs),
+    Compare(CompareArgs),
     Sample(SampleArgs),
     Render(RenderArgs),
 }
@@ -65,16 +70,21 @@ pub(crate) enum Command {
 Examples:
   zmend info part.stl
   zmend info *.ply --json        one JSON object a file, one a line
+  zmend info huge.ply --quick    without looking for self-intersections
 
-The triangles of STL files are taken as connected where their corners are identical to the last bit. Whether a surface \
-crosses itself is not looked at.")]
+The triangles of STL files are taken as connected where their corners are identical to the last bit. \
+Self-intersections are pairs of faces that meet anywhere but in common corners and edges: faces that pass through each \
+other, touch, or fold over each other. They are decided exactly, and counted up to a million.")]
 pub(crate) struct InfoArgs {
-    /// Meshes to look at.
+    /// Meshes to look at, or octree files.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Print one JSON object a file, each on its line.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Do not look for self-intersections, which takes longer than all the rest.
+    #[arg(short, long)]
+    pub(crate) quick: bool,
 }
 
 /// Write a built-in mesh, broken or clean, to try things on.
@@ -88,7 +98,7 @@ pub(crate) struct SampleArgs {
     /// Name of the sample.
     #[arg(required_unless_present = "list")]
     pub(crate) name: Option<String>,
-    /// File to write: .stl, .ply, .obj or .off.
+    /// File to write: .stl, .ply, .obj, .off, .glb or .3mf.
     #[arg(value_name = "OUT", required_unless_present = "list")]
     pub(crate) out: Option<PathBuf>,
     /// How fine: the number of triangles grows with the square.

@@ -1,12 +1,13 @@
 //! What `zmend repair` understands.
 
-use super::values::{bytes, cell, coordinate, depth_range, scale};
+use super::values::{bytes, cell, coordinate, depth_range, keep, scale, width};
 use crate::goal::GoalFormat;
 use clap::{ArgGroup, ValueEnum};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use zmend::geom::Cube;
 use zmend::io::{Format, OctreeFormat};
+use zmend::{Keep, Thicken};
 
 /// Make a closed, manifold, oriented surface of any mesh.
 #[derive(Debug, clap::Args)]
@@ -25,6 +26,9 @@ Examples:
   zmend repair a.stl b.stl --box -5 -5 -5 10 --depth 9          the same grid for several models
   zmend repair in.ply out.ply --json --report full    measure both, for scripts
   zmend repair parts.stl one.stl --inside winding     solids that overlap become one
+  zmend repair cad.stl shell.stl --inside hull --gap 0.5    the outer shell, gaps up to 0.5 units closed
+  zmend repair leaf.obj leaf.stl --thicken 0.8        open sheets become walls 0.8 units thick
+  zmend repair scan.ply body.ply --keep largest --drop-cavities    one solid and nothing within
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
@@ -103,6 +107,41 @@ pub(crate) struct InsideArgs {
     /// How inside is told from outside.
     #[arg(short, long = "inside", value_name = "RULE", value_enum, default_value_t = InsideArg::Auto)]
     pub(crate) rule: InsideArg,
+    /// With --inside hull: close gaps between faces up to this width, in model units.
+    #[arg(long, value_name = "WIDTH", value_parser = width, allow_negative_numbers = true)]
+    pub(crate) gap: Option<f64>,
+    /// Give faces that bound no solid a wall so thick, in model units; at least two cells. Without it, open sheets vanish.
+    #[arg(long, value_name = "WIDTH", value_parser = width, allow_negative_numbers = true)]
+    pub(crate) thicken: Option<f64>,
+    /// Which faces get that wall.
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = ThickenArg::Sheets, requires = "thicken")]
+    pub(crate) thicken_what: ThickenArg,
+    /// Which solids stay: all, largest, those at least so large as a part of the largest (0.1), or so many of the largest (3).
+    ///
+    /// Size is counted in grid edges that the solid's surface crosses, which is about its area.
+    #[arg(long, value_name = "WHICH", default_value = "all", value_parser = keep, allow_negative_numbers = true)]
+    pub(crate) keep: Keep,
+    /// Fill cavities: what is outside, but cannot be reached from there.
+    #[arg(long)]
+    pub(crate) drop_cavities: bool,
+}
+
+/// Faces that get a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ThickenArg {
+    /// Those that bound no solid.
+    Sheets,
+    /// All; solids grow by half the width.
+    All,
+}
+
+impl From<ThickenArg> for Thicken {
+    fn from(arg: ThickenArg) -> Self {
+        match arg {
+            ThickenArg::Sheets => Thicken::Sheets,
+            ThickenArg::All => Thicken::All,
+        }
+    }
 }
 
 /// What is extracted.
@@ -187,6 +226,8 @@ pub(crate) enum InsideArg {
     Parity,
     /// What the faces go round, by the way they are turned: overlaps become unions, walls inside vanish, holes close smoothly.
     Winding,
+    /// What infinity cannot reach without passing through a face, whichever way faces are turned. See --gap.
+    Hull,
 }
 
 impl From<InsideArg> for zmend::Inside {
@@ -195,6 +236,7 @@ impl From<InsideArg> for zmend::Inside {
             InsideArg::Auto => zmend::Inside::Auto,
             InsideArg::Parity => zmend::Inside::Parity,
             InsideArg::Winding => zmend::Inside::Winding,
+            InsideArg::Hull => zmend::Inside::Hull,
         }
     }
 }

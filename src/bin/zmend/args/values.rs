@@ -2,6 +2,7 @@
 
 use clap::builder::RangedI64ValueParser;
 use clap::value_parser;
+use zmend::Keep;
 use zmend::geom::frame::{DEPTHS, Frame};
 use zmend::mesh::{Bounds, sample};
 
@@ -54,6 +55,42 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
     }
 }
 
+/// The greatest distance that is allowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Limit {
+    /// In model units.
+    Length(f64),
+    /// In hundredths of the diagonal of a box.
+    Percent(f64),
+}
+
+/// A length, or a percentage.
+pub(super) fn limit(text: &str) -> Result<Limit, String> {
+    let (number, limit) =
+        text.strip_suffix('%').map_or((text, Limit::Length as fn(f64) -> Limit), |n| (n, Limit::Percent));
+    let number = number.trim().parse().ok().filter(|n| (0.0..f64::INFINITY).contains(n));
+    number.map(limit).ok_or_else(|| "not a length or percentage such as 0.01 or 0.5%".to_owned())
+}
+
+/// A length in model units.
+pub(super) fn width(text: &str) -> Result<f64, String> {
+    let width = text.parse().map_err(|_| "not a number".to_owned())?;
+    if width > 0.0 && f64::is_finite(width) { Ok(width) } else { Err("not a width above 0".to_owned()) }
+}
+
+/// `all`, `largest`, a number of solids, or a ratio, which is written with a point.
+pub(super) fn keep(text: &str) -> Result<Keep, String> {
+    let keep = match text {
+        "all" => Keep::All,
+        "largest" => Keep::Largest,
+        _ => match text.parse() {
+            Ok(count) => Keep::Count(count),
+            Err(_) => Keep::Ratio(text.parse().map_err(|_| "not `all`, `largest`, a ratio or a number".to_owned())?),
+        },
+    };
+    keep.check().map(|()| keep).map_err(|e| e.to_string())
+}
+
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|degrees: &f64| degrees.is_finite()).ok_or_else(|| "not a number of degrees".to_owned())
 }
@@ -89,6 +126,16 @@ mod tests {
         assert_eq!(cell("0.25"), Ok(0.25));
         assert!(["0", "-1", "nan", "inf", "x", "1e-320"].iter().all(|bad| cell(bad).is_err()));
         assert!(coordinate("-1e9").is_ok() && coordinate("inf").is_err());
+        assert_eq!((limit("0.25"), limit("2 %")), (Ok(Limit::Length(0.25)), Ok(Limit::Percent(2.0))));
+        assert!(["", "%", "-1", "nan", "inf%", "1%%", "x"].iter().all(|bad| limit(bad).is_err()));
+        assert_eq!(
+            (keep("1"), keep("1.0"), keep("0.25")),
+            (Ok(Keep::Count(1)), Ok(Keep::Ratio(1.0)), Ok(Keep::Ratio(0.25)))
+        );
+        assert_eq!((keep("all"), keep("largest")), (Ok(Keep::All), Ok(Keep::Largest)));
+        assert!(["0", "-1", "1.5", "nan", "most", ""].iter().all(|bad| keep(bad).is_err()));
+        assert_eq!(width("2.5"), Ok(2.5));
+        assert!(["0", "-1", "nan", "inf", "x"].iter().all(|bad| width(bad).is_err()));
         assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
     }
 }

@@ -7,18 +7,18 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 /// Each set is a tree whose root is its least element (links point downwards), so the partition that a set of unions leads
 /// to, and the number of those that joined anything, depend neither on their order nor on the threads that made them.
 /// Relaxed loads and stores suffice: nothing is read but the links themselves, and any link ever seen stays true.
-pub(super) struct Sets {
+pub(crate) struct Sets {
     parent: Vec<AtomicU32>,
 }
 
 impl Sets {
     /// `n` single elements; `n` is below 2^32.
-    pub(super) fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         Sets { parent: (0..n as u32).map(AtomicU32::new).collect() }
     }
 
     /// Joins the sets of two elements. Whether they were different until now.
-    pub(super) fn union(&self, a: u32, b: u32) -> bool {
+    pub(crate) fn union(&self, a: u32, b: u32) -> bool {
         let (mut a, mut b) = (a, b);
         loop {
             (a, b) = (self.root(a), self.root(b));
@@ -33,8 +33,8 @@ impl Sets {
         }
     }
 
-    /// Follows links to the root; each element passed is linked to its grandparent on the way.
-    fn root(&self, mut a: u32) -> u32 {
+    /// The least element of the set of `a`. Follows links to the root; each element passed is linked to its grandparent on the way.
+    pub(crate) fn root(&self, mut a: u32) -> u32 {
         loop {
             let parent = self.parent[a as usize].load(Relaxed);
             if parent == a {

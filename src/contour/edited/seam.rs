@@ -1,0 +1,128 @@
+//! The unedited surface as it passes by, with holes where edits touch it, into which the patch is put.
+
+use super::place::place;
+use super::polygons::{Patch, Polygons};
+use crate::contour::DualOptions;
+use crate::error::Result;
+use crate::geom::Frame;
+use crate::mesh::{MeshSink, MeshSizes};
+use crate::octree::Crossings;
+use glam::DVec3;
+
+/// Takes the unedited surface as polygons and passes the edited one on.
+pub(super) struct Seam<'a> {
+    sink: &'a mut (dyn MeshSink + Send),
+    crossings: &'a Crossings,
+    frame: &'a Frame,
+    patch: &'a Patch<'a>,
+    polygons: &'a Polygons,
+    /// What the edited surface will have.
+    sizes: MeshSizes,
+    options: DualOptions<'a>,
+    /// Vertices of the unedited surface that have passed, those of them that were dropped, and those of the ring.
+    passed: u32,
+    dropped: usize,
+    /// The vertices of untouched cells that the patch uses, and their positions in cells as far as they have passed.
+    ring: Vec<u32>,
+    fixed: Vec<DVec3>,
+    /// Whether the points of the patch have been passed on.
+    is_placed: bool,
+}
+
+impl<'a> Seam<'a> {
+    pub(super) fn new(
+        sink: &'a mut (dyn MeshSink + Send),
+        crossings: &'a Crossings,
+        frame: &'a Frame,
+        (patch, polygons): (&'a Patch<'a>, &'a Polygons),
+        sizes: MeshSizes,
+        options: DualOptions<'a>,
+    ) -> Self {
+        let mut ring: Vec<u32> = polygons.sides().map(|[from, _]| from).filter(|&v| v < patch.kept).collect();
+        ring.sort_unstable();
+        ring.dedup();
+        let fixed = Vec::with_capacity(ring.len());
+        Seam {
+            sink,
+            crossings,
+            frame,
+            patch,
+            polygons,
+            sizes,
+            options,
+            passed: 0,
+            dropped: 0,
+            ring,
+            fixed,
+            is_placed: false,
+        }
+    }
+
+    /// Passes on points of untouched cells, and keeps those of the ring.
+    fn keep(&mut self, points: &[DVec3]) -> Result<()> {
+        let first = self.passed - self.dropped as u32;
+        while let Some(&vertex) = self.ring.get(self.fixed.len()) {
+            let Some(&point) = points.get((vertex - first) as usize) else { break };
+            self.fixed.push((point - self.frame.origin()) / self.frame.cell_size());
+        }
+        self.passed += points.len() as u32;
+        self.sink.points(points)
+    }
+
+    /// Passes on the points of the patch, unless that was done: all others have passed.
+    fn end_points(&mut self) -> Result<()> {
+        if std::mem::replace(&mut self.is_placed, true) {
+            return Ok(());
+        }
+        let placed = place(self.crossings, self.options.placement, self.patch, self.polygons, &self.ring, &self.fixed);
+        let points: Vec<DVec3> = placed.into_iter().map(|p| self.frame.to_model(p)).collect();
+        self.sink.points(&points)
+    }
+
+    /// Passes on the faces of the patch.
+    pub(super) fn finish(mut self) -> Result<()> {
+        self.end_points()?;
+        self.quads(self.polygons.quads.as_flattened())?;
+        self.sink.faces(3, self.polygons.triangles.as_flattened())
+    }
+
+    /// Passes on quadrilaterals, or the triangles they are cut into.
+    fn quads(&mut self, corners: &[u32]) -> Result<()> {
+        if !self.options.triangles {
+            return self.sink.faces(4, corners);
+        }
+        let cut: Vec<u32> = corners.chunks_exact(4).flat_map(|q| [q[0], q[1], q[2], q[0], q[2], q[3]]).collect();
+        self.sink.faces(3, &cut)
+    }
+}
+
+impl MeshSink for Seam<'_> {
+    fn begin(&mut self, _: MeshSizes) -> Result<()> {
+        self.sink.begin(self.sizes)
+    }
+
+    fn points(&mut self, mut points: &[DVec3]) -> Result<()> {
+        while !points.is_empty() {
+            let next = self.patch.dropped.get(self.dropped).map_or(points.len(), |&v| (v - self.passed) as usize);
+            let (kept, rest) = points.split_at(next.min(points.len()));
+            self.keep(kept)?;
+            points = rest;
+            if !points.is_empty() {
+                points = &points[1..];
+                self.passed += 1;
+                self.dropped += 1;
+            }
+        }
+        Ok(())
+    }
+
+    fn faces(&mut self, arity: usize, corners: &[u32]) -> Result<()> {
+        self.end_points()?;
+        let ranks = &self.patch.ranks;
+        let mut kept = Vec::with_capacity(corners.len());
+        for face in corners.chunks_exact(arity).filter(|face| !face.iter().any(|&v| ranks.contains(v))) {
+            kept.extend(face.iter().map(|&v| v - ranks.rank(v)));
+        }
+        if arity == 4 { self.quads(&kept) } else { self.sink.faces(arity, &kept) }
+    }
+}

@@ -1,0 +1,266 @@
+//! Skeletons and patches to look at: lines with weights, and faces with colours.
+//!
+//! Plain data in, PLY or OBJ out. PLY holds everything: edges have the properties `vertex1`, `vertex2`, `weight`, `red`, `green`, `blue`,
+//! faces a list and a colour. OBJ has lines (`l`) with their weights in comments, and faces without colours.
+
+use super::encode::{Out, Precision};
+use super::file::AtomicFile;
+use super::format::Format;
+use crate::error::{Error, Place, Result};
+use glam::DVec3;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Red, green, blue.
+pub type Colour = [u8; 3];
+
+/// Straight lines between points.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Lines {
+    /// Positions in model units.
+    pub points: Vec<DVec3>,
+    /// The lines.
+    pub lines: Vec<Line>,
+}
+
+/// A line between two points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Indices of its points.
+    pub ends: [u32; 2],
+    /// Its weight, for example the area of the section there.
+    pub weight: f32,
+    /// How it is shown.
+    pub colour: Colour,
+}
+
+/// Quadrilaterals between points.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Patches {
+    /// Positions in model units.
+    pub points: Vec<DVec3>,
+    /// The corners of each quadrilateral, and how it is shown.
+    pub quads: Vec<([u32; 4], Colour)>,
+}
+
+/// A colour for a share between 0 (red: the thinnest) and 1 (blue: the thickest), over orange, white and light blue. Shares beyond are cut
+/// off, NaN is white.
+pub fn colour_of_share(share: f64) -> Colour {
+    const STOPS: [[f64; 3]; 5] =
+        [[202.0, 0.0, 32.0], [244.0, 165.0, 130.0], [247.0, 247.0, 247.0], [146.0, 197.0, 222.0], [5.0, 113.0, 176.0]];
+    let place = if share.is_nan() { 2.0 } else { 4.0 * share.clamp(0.0, 1.0) };
+    let stop = (place as usize).min(3);
+    let fraction = place - stop as f64;
+    std::array::from_fn(|i| (STOPS[stop][i] * (1.0 - fraction) + STOPS[stop + 1][i] * fraction).round() as u8)
+}
+
+/// Writes lines as PLY or OBJ, whichever the name says. Returns the size of the file in bytes.
+///
+/// # Errors
+/// When the name says neither, a line refers to a point that does not exist, or the file cannot be written.
+pub fn write_lines(path: impl AsRef<Path>, lines: &Lines) -> Result<u64> {
+    let path = path.as_ref();
+    let is_ply = is_ply(path)?;
+    check_corners(path, "line", lines.points.len(), lines.lines.iter().map(|line| &line.ends[..]))?;
+    let mut text = Text::create(path)?;
+    if is_ply {
+        let edges = format!(
+            "element edge {}\nproperty int vertex1\nproperty int vertex2\nproperty float weight\n{COLOUR}",
+            lines.lines.len()
+        );
+        text.ply_points(&lines.points, &edges)?;
+        for Line { ends: [a, b], weight, colour: [red, green, blue] } in &lines.lines {
+            let bits = weight.to_bits().to_le_bytes();
+            text.put(&[&a.to_le_bytes()[..], &b.to_le_bytes(), &bits, &[*red, *green, *blue]].concat())?;
+        }
+        return text.finish();
+    }
+    text.obj_points(&lines.points)?;
+    let mut last = None;
+    for line in &lines.lines {
+        if last.replace(line.weight.to_bits()) != Some(line.weight.to_bits()) {
+            text.put(format!("# weight {}\n", line.weight).as_bytes())?;
+        }
+        text.put(format!("l {} {}\n", line.ends[0] + 1, line.ends[1] + 1).as_bytes())?;
+    }
+    text.finish()
+}
+
+/// Writes quadrilaterals as PLY or OBJ, whichever the name says; OBJ has no colours. Returns the size of the file in bytes.
+///
+/// # Errors
+/// When the name says neither, a quadrilateral refers to a point that does not exist, or the file cannot be written.
+pub fn write_patches(path: impl AsRef<Path>, patches: &Patches) -> Result<u64> {
+    let path = path.as_ref();
+    let is_ply = is_ply(path)?;
+    check_corners(path, "face", patches.points.len(), patches.quads.iter().map(|(corners, _)| &corners[..]))?;
+    let mut text = Text::create(path)?;
+    if is_ply {
+        let faces = format!("element face {}\nproperty list uchar int vertex_indices\n{COLOUR}", patches.quads.len());
+        text.ply_points(&patches.points, &faces)?;
+        for (corners, colour) in &patches.quads {
+            let [a, b, c, d] = corners.map(u32::to_le_bytes);
+            text.put(&[&[4][..], &a, &b, &c, &d, colour].concat())?;
+        }
+        return text.finish();
+    }
+    text.obj_points(&patches.points)?;
+    for ([a, b, c, d], _) in &patches.quads {
+        text.put(format!("f {} {} {} {}\n", a + 1, b + 1, c + 1, d + 1).as_bytes())?;
+    }
+    text.finish()
+}
+
+/// The properties of a colour in the header of a PLY file.
+const COLOUR: &str = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+
+fn is_ply(path: &Path) -> Result<bool> {
+    match Format::from_path(path) {
+        Some(Format::Ply) => Ok(true),
+        Some(Format::Obj) => Ok(false),
+        _ => {
+            let problem = "the name says neither PLY nor OBJ";
+            let remedy = "give it a name that ends in .ply or .obj";
+            Err(Error::format(path.display().to_string(), Place::Whole, problem, remedy))
+        }
+    }
+}
+
+fn check_corners<'a>(path: &Path, what: &str, points: usize, corners: impl Iterator<Item = &'a [u32]>) -> Result<()> {
+    for (i, corners) in corners.enumerate() {
+        // PLY has signed indices.
+        if let Some(corner) = corners.iter().find(|&&c| c as usize >= points || c > i32::MAX as u32) {
+            let problem = format!("{what} {i} refers to point {corner}, but there are {points}");
+            return Err(Error::format(path.display().to_string(), Place::Whole, problem, ""));
+        }
+    }
+    Ok(())
+}
+
+/// Bytes gathered before they are written.
+const CHUNK: usize = 1 << 18;
+
+/// A file on its way.
+struct Text {
+    file: AtomicFile,
+    out: Out,
+    bytes: u64,
+}
+
+impl Text {
+    fn create(path: &Path) -> Result<Self> {
+        Ok(Text { file: AtomicFile::create(path)?, out: Out::default(), bytes: 0 })
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.push(bytes);
+        if self.out.bytes().len() < CHUNK { Ok(()) } else { self.flush() }
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.file.write(self.out.bytes())?;
+        self.bytes += self.out.bytes().len() as u64;
+        self.out.clear();
+        Ok(())
+    }
+
+    /// A binary PLY file up to the end of its points; `behind` is the rest of the header.
+    fn ply_points(&mut self, points: &[DVec3], behind: &str) -> Result<()> {
+        let mut header =
+            format!("ply\nformat binary_little_endian 1.0\ncomment zmend\nelement vertex {}\n", points.len());
+        for axis in ["x", "y", "z"] {
+            let _ = writeln!(header, "property float {axis}");
+        }
+        header.push_str(behind);
+        header.push_str("end_header\n");
+        self.put(header.as_bytes())?;
+        points.iter().try_for_each(|p| self.put(p.as_vec3().to_array().map(f32::to_le_bytes).as_flattened()))
+    }
+
+    fn obj_points(&mut self, points: &[DVec3]) -> Result<()> {
+        self.put(b"# zmend\n")?;
+        for &point in points {
+            self.out.push(b"v ");
+            self.out.push_vector(point, Precision::Single);
+            self.put(b"\n")?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<u64> {
+        self.flush()?;
+        self.file.commit()?;
+        Ok(self.bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(ends: [u32; 2], weight: f32) -> Line {
+        Line { ends, weight, colour: [1, 2, 3] }
+    }
+
+    fn written(name: &str, write: impl Fn(&Path) -> Result<u64>) -> Vec<u8> {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join(name);
+        let size = write(&path).expect("written");
+        let bytes = std::fs::read(&path).expect("there");
+        assert_eq!(bytes.len() as u64, size);
+        bytes
+    }
+
+    #[test]
+    fn lines_have_weights_and_colours() {
+        let lines =
+            Lines { points: vec![DVec3::X, DVec3::Y, DVec3::Z], lines: vec![line([0, 1], 2.5), line([2, 1], 2.5)] };
+        let bytes = written("a.ply", |path| write_lines(path, &lines));
+        let header = b"end_header\n";
+        let body = bytes.windows(header.len()).position(|w| w == header).expect("a header") + header.len();
+        let head = std::str::from_utf8(&bytes[..body]).expect("text");
+        assert!(
+            head.contains("element vertex 3\n") && head.contains("element edge 2\nproperty int vertex1\n"),
+            "{head}"
+        );
+        let edges = &bytes[body + 3 * 12..];
+        let first = [&0u32.to_le_bytes()[..], &1u32.to_le_bytes(), &2.5f32.to_le_bytes(), &[1, 2, 3]].concat();
+        assert_eq!((edges.len(), &edges[..15]), (30, &first[..]));
+
+        let text = String::from_utf8(written("a.obj", |path| write_lines(path, &lines))).expect("text");
+        assert_eq!(text, "# zmend\nv 1 0 0\nv 0 1 0\nv 0 0 1\n# weight 2.5\nl 1 2\nl 3 2\n");
+    }
+
+    #[test]
+    fn patches_are_meshes() {
+        let points = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+        let patches =
+            Patches { points: points.clone(), quads: vec![([0, 1, 2, 3], [255, 0, 0]), ([3, 2, 1, 0], [0; 3])] };
+        for name in ["a.ply", "a.obj"] {
+            let bytes = written(name, |path| write_patches(path, &patches));
+            let mesh = crate::io::read_bytes(name, &bytes, Format::from_path(Path::new(name))).expect("a mesh");
+            assert_eq!(mesh.points, points);
+            assert!(mesh.faces.iter().eq(patches.quads.iter().map(|q| &q.0[..])));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_refused() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let lines = Lines { points: vec![DVec3::X], lines: vec![line([0, 1], 0.0)] };
+        let error = write_lines(directory.path().join("a.ply"), &lines).expect_err("no point 1");
+        assert!(error.to_string().contains("line 0 refers to point 1, but there are 1"));
+        let error = write_lines(directory.path().join("a.stl"), &Lines::default()).expect_err("no lines");
+        assert!(error.to_string().contains(".ply or .obj"));
+        let patches = Patches { points: Vec::new(), quads: vec![([0; 4], [0; 3])] };
+        assert!(write_patches(directory.path().join("a.obj"), &patches).is_err());
+        assert_eq!(std::fs::read_dir(directory.path()).expect("a directory").count(), 0);
+    }
+
+    #[test]
+    fn colours_go_from_red_to_blue() {
+        assert_eq!((colour_of_share(0.0), colour_of_share(-1.0)), ([202, 0, 32], [202, 0, 32]));
+        assert_eq!((colour_of_share(1.0), colour_of_share(f64::INFINITY)), ([5, 113, 176], [5, 113, 176]));
+        assert_eq!((colour_of_share(0.5), colour_of_share(f64::NAN)), ([247; 3], [247; 3]));
+    }
+}
