@@ -334,11 +334,16 @@ impl Complex {
         if inward != face.is_high() {
             return Some(Spot { extent, ..spot });
         }
-        let mut at = spot.local.coords();
-        let c = &mut at[axis.index()];
-        let (across, next) = if face.is_high() { (*c == 7, (*c + 1) & 7) } else { (*c == 0, c.wrapping_sub(1) & 7) };
-        *c = next;
-        let local = Local::new(at[0], at[1], at[2]);
+        // The coordinates of a position are three bits each, x highest.
+        let place = 6 - 3 * axis.index() as u32;
+        let (index, one) = (spot.local.index(), 1 << place);
+        let c = index >> place & 7;
+        let (across, next) = if face.is_high() {
+            (c == 7, if c == 7 { index - 7 * one } else { index + one })
+        } else {
+            (c == 0, if c == 0 { index + 7 * one } else { index - one })
+        };
+        let local = Local::from_index(next);
         let brick = if across { self.beside(spot.brick, face) } else { spot.brick };
         (brick < DEEP).then_some(Spot { brick, extent, local })
     }

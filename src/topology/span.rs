@@ -36,6 +36,13 @@ struct Candidate {
     section: Section,
 }
 
+impl Candidate {
+    /// What the thinnest edge of an arc has least: of sections of about the same area, the straighter one changes less.
+    fn cost(&self) -> f64 {
+        self.section.area + self.section.squares as f64 / 4.0
+    }
+}
+
 /// The loops of a skeleton, from the thinnest on.
 pub(super) fn loops(
     octree: &EditedOctree,
@@ -88,7 +95,7 @@ fn root(parent: &mut [u32], mut a: u32) -> u32 {
 }
 
 /// How many sections of an arc are taken before it is known whether it closes a loop.
-const TRIES: usize = 3;
+const TRIES: usize = 2;
 
 fn take(sections: &mut Sections<'_>, edges: &[Spot], i: usize) -> Candidate {
     Candidate { place: i, edge: edges[i], section: sections.at(edges[i]) }
@@ -110,7 +117,7 @@ fn thin_place(sections: &mut Sections<'_>, edges: &[Spot]) -> Candidate {
         let Some((_, next)) = left.find(|(_, i)| taken.iter().all(|t| t.abs_diff(*i) >= apart)) else { break };
         let other = take(sections, edges, next);
         taken.push(next);
-        if other.section.area < best.section.area {
+        if other.cost() < best.cost() {
             best = other;
         }
     }
@@ -119,12 +126,12 @@ fn thin_place(sections: &mut Sections<'_>, edges: &[Spot]) -> Candidate {
 
 /// The thinnest section near a thin one.
 fn refined(sections: &mut Sections<'_>, edges: &[Spot], mut best: Candidate) -> Loop {
-    let mut step = width(best.section.area).div_ceil(2);
+    let mut step = width(best.section.area).div_ceil(4);
     while step > 0 {
         let middle = best.place;
         for i in [middle.checked_sub(step), Some(middle + step)].into_iter().flatten().filter(|&i| i < edges.len()) {
             let other = take(sections, edges, i);
-            if other.section.area < best.section.area {
+            if other.cost() < best.cost() {
                 best = other;
             }
         }
