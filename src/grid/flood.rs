@@ -53,7 +53,7 @@ pub fn parts(open: &[Plane; 3]) -> impl Iterator<Item = Plane> {
         let mut seed = Plane::EMPTY;
         seed.set(Local::from_index(64 * x as u32 + rest.0[x].trailing_zeros()));
         let part = flooded(seed, open);
-        rest = rest & !part;
+        rest &= !part;
         Some(part)
     })
 }
@@ -102,7 +102,7 @@ mod tests {
             for part in parts(&open) {
                 let first = rest.iter().next().expect("parts are not empty");
                 prop_assert_eq!(part, walked(first, &open));
-                rest = rest & !part;
+                rest &= !part;
             }
             prop_assert!(rest.is_empty());
         }

@@ -141,7 +141,7 @@ impl<'a> Components<'a> {
                     Err(Some(key)) if is_dropped(self.regions.of_absent(key)) => Plane::FULL,
                     Err(_) => Plane::EMPTY,
                 };
-                *kept = *kept & !(dropped | dropped.at_plus(axis, &higher));
+                *kept &= !(dropped | dropped.at_plus(axis, &higher));
             }
             kept
         };

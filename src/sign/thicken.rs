@@ -219,7 +219,7 @@ pub(super) fn clipped(key: Key, mut plane: Plane) -> Plane {
     let interior = [Plane::at_minus_x, Plane::at_minus_y, Plane::at_minus_z].map(|up| up(&Plane::FULL, &Plane::EMPTY));
     for (c, interior) in key.min_corner().into_iter().zip(interior) {
         if c == 0 {
-            plane = plane & interior;
+            plane &= interior;
         }
     }
     plane

@@ -118,7 +118,7 @@ impl Touched {
 fn keep(planes: &mut LinearOctree<Plane>, (key, plane): (Key, Plane)) {
     if !plane.is_empty() {
         let listed = planes.get_or_insert_with(key, || Plane::EMPTY);
-        *listed = *listed | plane;
+        *listed |= plane;
     }
 }
 
