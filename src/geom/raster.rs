@@ -39,7 +39,7 @@ pub trait Hits {
     /// cell from its start.
     fn hit(&mut self, axis: Axis, at: [u32; 3], offset: u16);
 
-    /// Whether no more hits are wanted: asked every [`ROWS`] rows of lattice lines, so that even the largest triangle soon ends.
+    /// Whether no more hits are wanted: asked every some rows of lattice lines, so that even the largest triangle soon ends.
     fn is_enough(&self) -> bool {
         false
     }

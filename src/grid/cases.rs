@@ -399,7 +399,7 @@ mod tests {
 
     /// Whether a plane through three of the corners of two triangles and of the cell has all other corners of the one strictly on one
     /// side and those of the other on the other, wherever the crossings are: then the triangles meet in what they share, nowhere else.
-    fn are_separated(s: &[Edge; 3], t: &[Edge; 3]) -> bool {
+    fn are_separated(s: [Edge; 3], t: [Edge; 3]) -> bool {
         let [s, t] = [s, t].map(|t| t.map(Place::On));
         let mut places: Vec<Place> = [s, t].concat().into_iter().chain(Corner::ALL.map(Place::At)).collect();
         places.sort();
@@ -420,7 +420,7 @@ mod tests {
         for mask in 0..=255u8 {
             let triangles = &CASES[usize::from(mask)].triangles;
             for (i, s) in triangles.iter().enumerate() {
-                let crossing = triangles[..i].iter().filter(|t| !are_separated(s, t));
+                let crossing = triangles[..i].iter().filter(|t| !are_separated(*s, **t));
                 bad.extend(crossing.map(|t| format!("mask {mask:#b}: {s:?} and {t:?}")));
             }
         }

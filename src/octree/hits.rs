@@ -173,12 +173,11 @@ impl OrientedHits {
         let mut place = brick.first as usize;
         for axis in Axis::ALL {
             for local in brick.crossed[axis.index()].iter() {
-                match several.next_if(|&(a, l, _)| (a, l) == (axis, local)) {
-                    Some((_, _, hits)) => each(axis, local, hits),
-                    None => {
-                        let leaves = leaving[axis.index()].get(local);
-                        each(axis, local, &[EdgeHit { sample: self.edges.sample_at(place), leaves }]);
-                    }
+                if let Some((_, _, hits)) = several.next_if(|&(a, l, _)| (a, l) == (axis, local)) {
+                    each(axis, local, hits);
+                } else {
+                    let leaves = leaving[axis.index()].get(local);
+                    each(axis, local, &[EdgeHit { sample: self.edges.sample_at(place), leaves }]);
                 }
                 place += 1;
             }
@@ -342,7 +341,7 @@ struct BitList {
 impl BitList {
     #[inline]
     fn push(&mut self, bit: bool) {
-        if self.len & 63 == 0 {
+        if self.len.is_multiple_of(64) {
             self.words.push(0);
         }
         let last = self.words.len() - 1;
@@ -353,7 +352,7 @@ impl BitList {
     fn append(&mut self, other: &BitList) {
         let shift = self.len & 63;
         self.len += other.len;
-        for &word in other.words.iter() {
+        for &word in &other.words {
             if shift == 0 {
                 self.words.push(word);
             } else {

@@ -53,7 +53,7 @@ impl SignedOctree {
         rows.par_sort_unstable();
         // Pieces end where rows do; few of them wait at a time.
         let is_in_row = |i: usize| i > 0 && i < rows.len() && rows[i - 1].0 >> 16 == rows[i].0 >> 16;
-        let row_end = |from: usize| (from..).find(|&i| !is_in_row(i)).expect("the last row ends");
+        let row_end = |from: usize| (from..rows.len()).find(|&i| !is_in_row(i)).unwrap_or(rows.len());
         let (count, piece) = pieces(rows.len(), 1024);
         let signs = |(): &mut (), n| {
             let Range { start, end } = piece(n);

@@ -39,8 +39,6 @@ pub enum Reason {
     Open,
     /// The surface is open, and its faces are turned this way and that.
     OpenAndTurned,
-    /// The surface is open, and the patches over its holes are about as large as itself.
-    Sheet,
 }
 
 impl fmt::Display for Reason {
@@ -54,7 +52,6 @@ impl fmt::Display for Reason {
             Reason::Turned => "the surface is closed, but its faces are not all turned the same way",
             Reason::Open => "the surface is open and its faces are turned the same way",
             Reason::OpenAndTurned => "the surface is open and its faces are turned this way and that",
-            Reason::Sheet => "the surface is an open sheet that hardly encloses anything",
         })
     }
 }
@@ -90,20 +87,17 @@ pub(super) fn tell(
     if boundary.is_empty() {
         return without_boundary(scan, inside, clock, progress);
     }
-    let asked = inside == Inside::Winding;
-    if !asked && let Some(reason) = distrust(&boundary) {
+    if inside == Inside::Auto {
+        // Winding numbers of open surfaces leave specks at their rims now and then; closing holes does not.
+        let reason = reason_of(&boundary);
         return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, reason, clock, progress);
     }
     let patches = clock.time(Stage::Close, || Patches::new(&scan.hits, &boundary, progress))?;
-    if !asked && is_sheet(&patches, scan.hits.len()) {
-        return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, Reason::Sheet, clock, progress);
-    }
     let odd_faces = boundary.iter().filter(|c| is_rim(c)).count() as u64;
     let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.area(), vanished: 0 };
     let winding = clock.time(Stage::Sign, || winding_signs(&scan.hits, &patches, progress))?;
-    let reason = if asked { Reason::Asked } else { Reason::Open };
     let vanished = vanished(&scan.hits, &winding.octree);
-    let choice = InsideChoice { rule: Inside::Winding, reason, reversed: patches.reversed() };
+    let choice = InsideChoice { rule: Inside::Winding, reason: Reason::Asked, reversed: patches.reversed() };
     Ok(Told { octree: winding.octree, counts: scan.counts, closing, choice, clipped: winding.clipped, vanished })
 }
 
@@ -145,21 +139,15 @@ fn is_rim(circulation: &Circulation) -> bool {
 /// Seams may be so many times as long as rims before orientation is not trusted: a few faces of a scan that are turned over do no harm.
 const MOST_SEAMS: f64 = 0.25;
 
-/// Why the orientation of a surface with this boundary says nothing, if so.
-fn distrust(boundary: &[Circulation]) -> Option<Reason> {
+/// What is to be said of a surface with this boundary.
+fn reason_of(boundary: &[Circulation]) -> Reason {
     let rims = boundary.iter().filter(|c| is_rim(c)).count();
     let seams = boundary.len() - rims;
     if rims == 0 {
-        Some(Reason::Turned)
+        Reason::Turned
+    } else if seams as f64 > MOST_SEAMS * rims as f64 {
+        Reason::OpenAndTurned
     } else {
-        (seams as f64 > MOST_SEAMS * rims as f64).then_some(Reason::OpenAndTurned)
+        Reason::Open
     }
-}
-
-/// Patches over the holes of a solid are smaller than so many times its surface. Of a ball cut in half they are half of it; of a
-/// shallow bowl or a relief nearly as large, and there a winding number of one half is anywhere.
-const MOST_PATCHES: f64 = 0.8;
-
-fn is_sheet(patches: &Patches, hits: usize) -> bool {
-    patches.area() as f64 > MOST_PATCHES * hits as f64
 }

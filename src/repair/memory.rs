@@ -30,7 +30,7 @@ const NORMAL: f64 = 2.0;
 /// Bytes for each crossing while dual contouring looks at it.
 const DUAL: f64 = 2.5;
 /// An estimate may be wrong by as much, as a factor.
-const SAFETY: f64 = 1.1;
+const SAFETY: f64 = 1.2;
 
 /// Progress that refuses to hold more than a limit.
 pub(super) struct Guard<'a> {

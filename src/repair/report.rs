@@ -32,7 +32,7 @@ pub struct RepairReport {
     pub bricks: u64,
     /// Bytes of the octree.
     pub octree_bytes: u64,
-    /// Estimate of the volume enclosed, in cubed model units: see [`SignedOctree::volume`]. [`Mesh::report`] has the exact one.
+    /// Estimate of the volume enclosed, in cubed model units: see [`SignedOctree::volume`](crate::octree::SignedOctree::volume). [`Mesh::report`](crate::Mesh::report) has the exact one.
     pub volume: f64,
     /// Size of the extracted surface.
     pub sizes: MeshSizes,

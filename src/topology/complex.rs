@@ -97,7 +97,7 @@ impl Record {
     }
 }
 
-/// A closed complex of finest elements in bricks; see the [module](self).
+/// A closed complex of finest elements in bricks; see the module.
 #[derive(Debug, Clone)]
 pub struct Complex {
     depth: u32,

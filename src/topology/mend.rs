@@ -164,7 +164,7 @@ impl Loops {
 }
 
 /// Steps of thinning after which no section of that area has a cell left: its inradius is at most that of the disc, and fronts move by at
-/// least 2.83 cells in five steps (see [`thin`](mod@super::thin)). One round more for the grid.
+/// least 2.83 cells in five steps (see [`thin`](fn@super::thin)). One round more for the grid.
 pub fn layers(limit: f64) -> Option<u32> {
     let layers = (limit / std::f64::consts::PI).sqrt() * 5.0 / 2.83 + 5.0;
     (layers < f64::from(1 << 20)).then(|| layers.ceil() as u32)

@@ -19,7 +19,7 @@ pub(crate) fn limit(asked: Option<u64>) -> Result<Option<u64>> {
 }
 
 /// Bytes beside what a repair counts: batches of triangles, pieces of meshes, tables of all threads.
-const BESIDE: u64 = 8_000_000;
+const BESIDE: u64 = 9_000_000;
 
 /// Bytes that the system would give: what is free of its memory, or of what it lets this process have.
 fn free() -> Option<u64> {

@@ -91,7 +91,8 @@ fn unbalanced(nets: &[Net; 4], axis: Axis) -> Plane {
     let beyond = |of: fn(&Net) -> &[Plane; 3], along: Axis, step: Axis| {
         shifted(&of(&nets[0])[along.index()], step, &of(&nets[1 + step.index()])[along.index()])
     };
-    let (rises, falls): (fn(&Net) -> &[Plane; 3], fn(&Net) -> &[Plane; 3]) = (|n| &n.rises, |n| &n.falls);
+    let rises: fn(&Net) -> &[Plane; 3] = |net| &net.rises;
+    let falls: fn(&Net) -> &[Plane; 3] = |net| &net.falls;
     let own = &nets[0];
     let up = [own.rises[u.index()], beyond(rises, v, u), beyond(falls, u, v), own.falls[v.index()]];
     let down = [own.falls[u.index()], beyond(falls, v, u), beyond(rises, u, v), own.rises[v.index()]];

@@ -5,7 +5,7 @@
 //! here nor there. And it bears holes: the solid angle under which the surface is seen, over that of the sphere, is a winding number that
 //! need not be whole (Jacobson, Kavan and Sorkine-Hornung 2013, "Robust inside-outside segmentation using generalized winding numbers").
 //!
-//! No triangle is looked at again. What is known are the jumps c of the winding number along the edges of the grid ([`OrientedHits`]).
+//! No triangle is looked at again. What is known are the jumps c of the winding number along the edges of the grid ([`OrientedHits`](crate::octree::OrientedHits)).
 //!
 //! 1. [`circulations`]: where jumps round a grid face do not add up to 0, the boundary of the surface passes.
 //! 2. Without any, winding numbers are whole, and prefix sums along x tell them for 64 lines at once ([`WholeNumbers`]). Inside is where
@@ -13,7 +13,7 @@
 //! 3. Else the boundary falls into oriented rings, and each is spanned by a [patch](Patches), as holes are [closed](super::close()).
 //!    With the patches' jumps d, c + d has no circulation, and prefix sums give whole numbers p.
 //! 4. The generalised winding number is w = p - s, where s, the part of the patches, is smooth but for them, and found from coarse to
-//!    fine on the bricks where it matters ([`field`]). What patches were chosen makes no difference to w.
+//!    fine on the bricks where it matters (`field`). What patches were chosen makes no difference to w.
 //! 5. Inside is where w is above one half, counted in the sense in which the whole of the input is oriented: if c + d encloses a negative
 //!    volume, all is taken as turned inside out, and a surface and its reverse come to exactly the same. (Not where its amount is above one half: on the outer side of an open, nearly flat or
 //!    hollow piece of surface w comes near to -1/2 or goes below.)
