@@ -38,8 +38,8 @@
 //!   cell may vanish or grow together: take a greater [`depth`](Options::depth).
 //! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside, unless it is
 //!   [thickened](Options::thicken).
-//! - **Inside is a matter of parity.** Where two closed solids overlap, the overlap is inside twice and counts as outside. It is not
-//!   their union.
+//! - **Unions ask for orientation.** Closed, oriented solids that overlap become their union. Where the surface is open or its faces are
+//!   turned this way and that, inside is a matter of parity: what lies inside two solids counts as outside. (See [`Inside`].)
 //! - **Faces of dual contouring may intersect**, here and there, mostly at creases and in walls thinner than a cell, unless
 //!   [`no_self_intersections`](Options::no_self_intersections) is asked for. Those of marching cubes and blocks never do.
 //!   [`Mesh::self_intersections`] finds them.

@@ -32,7 +32,7 @@ struct Outcome<'a> {
 /// What the solid came from.
 enum Source {
     Octree(OctreeInfo),
-    Mesh(RepairReport),
+    Mesh(Box<RepairReport>),
 }
 
 pub(crate) fn run(args: &RepairArgs, from: Option<OctreeFormat>, to: GoalFormat) -> Result<ExitCode> {
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &RepairArgs, from: Option<OctreeFormat>, to: GoalFormat)
         let (solid, report) = solidify(&mut input, &options, &bars)?;
         let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read);
         let times = [("read", read)].into_iter().chain(stages.map(|&(stage, time)| (stage.name(), time))).collect();
-        (solid, Source::Mesh(report), times)
+        (solid, Source::Mesh(Box::new(report)), times)
     };
     let begun = Instant::now();
     let (sizes, bytes) = interrupt::noted(|| write(args, &solid, &mut options, to, &bars))?;
