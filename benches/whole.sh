@@ -19,7 +19,7 @@ row() { # name, file, depth, options...
     for _ in 1 2 3; do
         rm -f "$work/out.ply"
         local t
-        t=$({ time "$zmend" repair "$file" "$work/out.ply" --depth "$depth" "$@" --report brief --json >"$work/json" 2>/dev/null; } 2>&1)
+        t=$({ time "$zmend" repair "$file" "$work/out.ply" --depth "$depth" --inside parity "$@" --report brief --json >"$work/json" 2>/dev/null; } 2>&1)
         best=$(printf '%s\n%s\n' "$best" "$t" | awk 'NF==3 && (!n || $1+$2<n) {n=$1+$2; b=$0} END {print b}')
     done
     awk -v name="$name" -v depth="$depth" -v how="$*" -v t="$best" -v cells="$(field crossings "$work/json")" \
