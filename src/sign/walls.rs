@@ -14,6 +14,7 @@
 
 use crate::grid::Key;
 use crate::octree::crossings::{Crossings, Toggle};
+use crate::sets::Sets;
 use hashbrown::HashMap;
 
 /// Bytes for each edge in question: the switch, its entry in the table (two slots at worst), the cluster, its excess, four faces.
@@ -29,7 +30,7 @@ pub(super) fn worth_merging(crossings: &Crossings, mut merges: Vec<Toggle>) -> V
     let mut place: HashMap<Key, usize, _> = HashMap::with_capacity_and_hasher(merges.len(), seeds);
     place.extend(merges.iter().enumerate().map(|(i, toggle)| (toggle.edge, i)));
 
-    let mut clusters = Clusters::new(merges.len());
+    let clusters = Sets::new(merges.len());
     // For each cluster, by its representative: odd faces if merged less odd faces if not.
     let mut excess = vec![0i64; merges.len()];
     let mut faces = Vec::new();
@@ -37,7 +38,7 @@ pub(super) fn worth_merging(crossings: &Crossings, mut merges: Vec<Toggle>) -> V
         for face in toggle.edge.coboundary() {
             let in_question: Vec<usize> = face.boundary().filter_map(|edge| place.get(&edge).copied()).collect();
             for &j in &in_question {
-                clusters.join(i, j);
+                clusters.union(i as u32, j as u32);
             }
             // Each face is weighed once, by the first of its edges, and only if its parity is in question.
             if in_question.iter().min() == Some(&i) && in_question.len() % 2 == 1 {
@@ -47,34 +48,12 @@ pub(super) fn worth_merging(crossings: &Crossings, mut merges: Vec<Toggle>) -> V
         }
     }
     for (i, change) in faces {
-        excess[clusters.find(i)] += change;
+        excess[clusters.root(i as u32) as usize] += change;
     }
     let mut i = 0;
     merges.retain(|_| {
         i += 1;
-        excess[clusters.find(i - 1)] <= 0
+        excess[clusters.root(i as u32 - 1) as usize] <= 0
     });
     merges
-}
-
-/// Disjoint sets with path halving; the least member represents its set.
-struct Clusters(Vec<usize>);
-
-impl Clusters {
-    fn new(n: usize) -> Self {
-        Clusters((0..n).collect())
-    }
-
-    fn find(&mut self, mut i: usize) -> usize {
-        while self.0[i] != i {
-            self.0[i] = self.0[self.0[i]];
-            i = self.0[i];
-        }
-        i
-    }
-
-    fn join(&mut self, i: usize, j: usize) {
-        let (i, j) = (self.find(i), self.find(j));
-        self.0[i.max(j)] = i.min(j);
-    }
 }

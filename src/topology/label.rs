@@ -86,17 +86,6 @@ impl Labels {
     pub(super) fn set_beside(&self, complex: &Complex, brick: u32, face: Face) -> u32 {
         self.roots[self.rows.gap_beside(complex, brick, face) as usize]
     }
-
-    /// By name of a set, the number of its full bricks that were not opened; of the sentinel's, only some.
-    pub(super) fn deep_bricks(&self) -> Vec<u64> {
-        let mut count = vec![0; self.names()];
-        for i in 0..self.rows.entries.len() {
-            if let Some((node, from, to)) = self.rows.gap_after(i) {
-                count[self.roots[node as usize] as usize] += u64::from(to - from);
-            }
-        }
-        count
-    }
 }
 
 /// The connected sets of points in a brick.
