@@ -70,6 +70,30 @@ pub struct Silent;
 
 impl Progress for Silent {}
 
+/// Progress of work that is done beside so many bytes that stay held.
+pub(crate) struct Beside<'a> {
+    pub(crate) progress: &'a dyn Progress,
+    pub(crate) bytes: u64,
+}
+
+impl Progress for Beside<'_> {
+    fn begin(&self, stage: Stage, total: u64) {
+        self.progress.begin(stage, total);
+    }
+
+    fn advance(&self, amount: u64) {
+        self.progress.advance(amount);
+    }
+
+    fn hold(&self, bytes: u64) -> Result<()> {
+        self.progress.hold(self.bytes.saturating_add(bytes))
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.progress.is_cancelled()
+    }
+}
+
 /// `Err(Cancelled)` once the caller wants to stop.
 pub(crate) fn check(progress: &dyn Progress) -> Result<()> {
     if progress.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }

@@ -8,7 +8,7 @@ use crate::mesh::TriangleSource;
 use crate::octree::SignedOctree;
 use crate::octree::signed::SIGN_BYTES;
 use crate::progress::{Progress, Stage};
-use crate::sign::winding::{Circulation, Patches, WholeNumbers, circulations, winding_signs};
+use crate::sign::winding::{Boundary, Circulation, Patches, WholeNumbers, circulations, winding_signs};
 use crate::sign::{Closing, OrientedScan, Scan, ScanCounts, close, parity_signs, scan, scan_oriented, vanished};
 use std::fmt;
 
@@ -92,9 +92,13 @@ pub(super) fn tell(
         let reason = reason_of(&boundary);
         return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, reason, clock, progress);
     }
-    let patches = clock.time(Stage::Close, || Patches::new(&scan.hits, &boundary, progress))?;
     let odd_faces = boundary.iter().filter(|c| is_rim(c)).count() as u64;
-    let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.area(), vanished: 0 };
+    let patches = clock.time(Stage::Close, || {
+        let held = (scan.hits.bytes() + size_of_val(&boundary[..])) as u64;
+        let edges = Boundary::of(source, frame, held, progress)?;
+        Patches::new(&edges, frame.depth(), held, progress)
+    })?;
+    let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.hits().len() as u64, vanished: 0 };
     let winding = clock.time(Stage::Sign, || winding_signs(&scan.hits, &patches, progress))?;
     let vanished = vanished(&scan.hits, &winding.octree);
     let choice = InsideChoice { rule: Inside::Winding, reason: Reason::Asked, reversed: patches.reversed() };

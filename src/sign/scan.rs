@@ -18,6 +18,7 @@ use super::hits::{BlockCoords, Bucket, Hit, HitSorter, Ledger, brick_coords, sor
 use super::walls;
 use crate::error::Result;
 use crate::geom::Frame;
+use crate::geom::frame::FINE_BITS;
 use crate::geom::raster::{FineTriangle, Hits, rasterise};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
@@ -25,7 +26,7 @@ use crate::mesh::{SourceCounts, TriangleSource};
 use crate::octree::crossings::{self, Brick, Builder, Crossings, Sample, Toggle, finest_element};
 use crate::octree::hits::{EdgeHit, HitBatch, HitsBuilder, OrientedHits};
 use crate::parallel::in_order;
-use crate::progress::{Progress, Stage, check};
+use crate::progress::{Beside, Progress, Stage, check};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -103,16 +104,50 @@ pub fn scan_oriented(
     progress: &dyn Progress,
 ) -> Result<OrientedScan> {
     let (hits, mut counts) = collect(source, frame, with_normals, progress)?;
-    let mut builder = HitsBuilder::new(frame.depth(), with_normals);
+    let hits = oriented(hits, frame.depth(), with_normals, progress)?;
+    counts.hits = hits.len() as u64;
+    Ok(OrientedScan { hits, counts })
+}
+
+/// All hits of triangles in fixed-point coordinates, without normals. `held` bytes are held by others.
+///
+/// # Errors
+/// `Cancelled`, `Memory` when `progress` says so, and when more than 2^32 edges are crossed.
+pub(super) fn scan_snapped(
+    triangles: &[FineTriangle],
+    depth: u32,
+    held: u64,
+    progress: &dyn Progress,
+) -> Result<OrientedHits> {
+    let progress = &Beside { progress, bytes: held };
+    let ledger = Ledger::new(progress);
+    let task = triangles.len().div_ceil(4 * rayon::current_num_threads()).clamp(1, TASK);
+    let tasks = triangles.par_chunks(task).fold(
+        || HitSorter::new(&ledger, false),
+        |mut sorter, triangles| {
+            triangles.iter().for_each(|triangle| rasterise(triangle, FINE_BITS - depth, &mut sorter));
+            sorter
+        },
+    );
+    let sorters: Vec<HitSorter<'_>> = tasks.collect();
+    ledger.result()?;
+    let collected = Collected { blocks: group_buckets(sorters.into_iter()), held: ledger.bytes() };
+    oriented(collected, depth, false, progress)
+}
+
+/// All hits, resolved.
+fn oriented(hits: Collected, depth: u32, with_normals: bool, progress: &dyn Progress) -> Result<OrientedHits> {
+    let mut builder = HitsBuilder::new(depth, with_normals);
+    let mut count = 0;
     let push = |block: Resolved| {
-        crossings::check_count(counts.hits + block.hits)?;
+        count += block.hits;
+        crossings::check_count(count)?;
         block.for_bricks(with_normals, |key, hit, offsets, normals| builder.push(key, hit, offsets, normals));
         builder.append(&block.oriented);
-        counts.hits += block.hits;
         Ok(builder.bytes() as u64)
     };
-    resolve::<true>(hits, frame.depth(), with_normals, progress, push)?;
-    Ok(OrientedScan { hits: builder.finish_within(progress)?, counts })
+    resolve::<true>(hits, depth, with_normals, progress, push)?;
+    builder.finish_within(progress)
 }
 
 impl OrientedScan {

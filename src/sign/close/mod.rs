@@ -116,32 +116,6 @@ fn fill(
     Ok((switches?.concat(), count))
 }
 
-/// Patches for an oriented boundary: faces and their circulations, which add up to 0 round every cell (see
-/// [`winding`](super::winding)). Adding 1 to the rise of the winding number along each edge that rises, and taking 1 from each other, leaves
-/// no circulation. Also returns the number of rings.
-///
-/// # Errors
-/// `Cancelled`.
-pub(super) fn span(
-    crossings: &Crossings,
-    circulations: &[(Key, i32)],
-    progress: &dyn Progress,
-) -> Result<(Vec<Switch>, u64)> {
-    let mut exits = Vec::new();
-    for &(face, strength) in circulations {
-        // Round a positive circulation the boundary goes up.
-        let mut cells = face.coboundary();
-        let from = if strength > 0 { cells.next() } else { cells.nth(1) };
-        let from = from.expect("faces of a boundary have two cells");
-        for _ in 0..strength.unsigned_abs() {
-            exits.push((from, Exit { number: exits.len() as u32, face }));
-        }
-    }
-    let held = crossings.bytes() as u64 + exits.len() as u64 * RIM_BYTES;
-    progress.hold(held)?;
-    fill(crossings, exits, held, progress)
-}
-
 #[cfg(test)]
 mod tests {
     use super::patch::middle_plane;

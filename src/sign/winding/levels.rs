@@ -104,6 +104,23 @@ impl Steps {
             net.steep.iter().filter(|(axis, ..)| axis.index() == 0).map(|&(_, local, jump)| (local, jump)).collect();
         Steps { rises: net.rises[0], falls: net.falls[0], more }
     }
+
+    /// Turns all jumps round.
+    pub(super) fn turn(&mut self) {
+        std::mem::swap(&mut self.rises, &mut self.falls);
+        self.more.iter_mut().for_each(|(_, jump)| *jump = -*jump);
+    }
+
+    /// Adds the jumps of another surface.
+    pub(super) fn add(&mut self, other: Steps) {
+        let (both_rise, both_fall) = (self.rises & other.rises, self.falls & other.falls);
+        self.rises = self.rises | other.rises;
+        self.falls = self.falls | other.falls;
+        self.more.extend(other.more);
+        self.more.extend(both_rise.iter().map(|local| (local, 1)));
+        self.more.extend(both_fall.iter().map(|local| (local, -1)));
+        self.more.sort_unstable();
+    }
 }
 
 /// Bricks in rows along x.

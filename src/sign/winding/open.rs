@@ -1,88 +1,40 @@
 //! Winding numbers of surfaces with boundary.
+//!
+//! A lattice point is inside if w = n + s is above one half, n being the whole number of hits and patches together, and s the angle of the
+//! spanning surface. Nearly everywhere that is known without looking at the point:
+//!
+//! - From the root down, a cell which no patch enters is looked at. Where patches are too small and too far for |s| to come to one half,
+//!   inside is where n is positive. Else there is one angle at its middle, and [`Span::steepness`] bounds how much it differs within. Where that leaves one answer to how large n must be, the cell is *calm*: bits of n are compared, 64 points at once. Cells
+//!   without hits, whose n is one number, are calm wherever w stays away from one half.
+//! - What is left are *rough* bricks: near the boundary, along patches, and where the surface w = 1/2 closes a hole. In each block of 4 x 4 x 4
+//!   points, value and slope of the angle at its middle and the bound of the second derivative decide about all points but those within a
+//!   fraction of a cell of that surface. These are looked at one by one.
+//! - Blocks next to the boundary have a [`View`]: what is near is summed up for every point, the rest is a polynomial.
+//!
+//! w is continuous across patches: in a block it is followed from the middle, and jumps at hits of the surface only.
+//!
+//! Beside a flat sheet w comes as near to one half as the sheet is large, on one side from below, or inside of a solid from above. So the few
+//! points nearer to it than angles are right are *ties*: they go with their neighbours if all of these agree.
 
-use super::circulation::Circulation;
-use super::field::{self, Dipole, Field};
 use super::levels::{Counter, Layer, Rows, Steps};
-use super::relax::{UNIT, Values};
+use super::net::Net;
+use super::patches::Patches;
 use super::samples::{Rule, push_samples};
+use super::span::ERROR;
+use super::view::{VIEW_ERROR, View};
 use super::whole::steps_of;
-use super::world;
 use crate::error::Result;
+use crate::geom::frame::FINE_BITS;
 use crate::geom::normal::NormalCode;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Face, Key};
 use crate::octree::SignedOctree;
-use crate::octree::crossings::{Sample, finest_element, lattice_point};
+use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::OrientedHits;
 use crate::progress::{Progress, Stage, check};
-use crate::sign::close::{Switch, span};
 use glam::DVec3;
 use rayon::prelude::*;
-
-/// Patches that span the boundary of an oriented surface.
-#[derive(Debug)]
-pub struct Patches {
-    /// Edges that patches cross, sorted, and by how much the winding number rises along them.
-    edges: Vec<(Key, i32)>,
-    rings: u64,
-    /// Whether hits and patches enclose a negative volume as they are turned. Then hits count the other way, and `edges` says so as well.
-    reversed: bool,
-}
-
-impl Patches {
-    /// Spans all rings of the boundary.
-    ///
-    /// # Errors
-    /// `Cancelled`.
-    pub fn new(hits: &OrientedHits, circulations: &[Circulation], progress: &dyn Progress) -> Result<Patches> {
-        let patches = Patches::turned(hits, circulations, false, progress)?;
-        if Bricks::of_surface(hits, &patches).volume() >= 0 {
-            return Ok(patches);
-        }
-        // Not the same rings the other way: made anew, so that a surface and its reverse come to exactly the same.
-        Patches::turned(hits, circulations, true, progress)
-    }
-
-    fn turned(
-        hits: &OrientedHits,
-        circulations: &[Circulation],
-        reversed: bool,
-        progress: &dyn Progress,
-    ) -> Result<Patches> {
-        let sign = if reversed { -1 } else { 1 };
-        let faces: Vec<(Key, i32)> = circulations.iter().map(|c| (c.face, sign * c.strength)).collect();
-        let (mut switches, rings) = span(hits.edges(), &faces, progress)?;
-        switches.par_sort_unstable();
-        let sum = |same: &[Switch]| (same[0].edge, same.iter().map(|s| if s.rises { 1 } else { -1 }).sum());
-        let edges = switches.chunk_by(|a, b| a.edge == b.edge).map(sum).filter(|&(_, jump)| jump != 0).collect();
-        Ok(Patches { edges, rings, reversed })
-    }
-
-    /// Whether the surface was found to be turned inside out.
-    pub fn reversed(&self) -> bool {
-        self.reversed
-    }
-
-    /// Number of rings of the boundary: about that of holes.
-    pub fn rings(&self) -> u64 {
-        self.rings
-    }
-
-    /// The edges that they cross, sorted, and by how much the winding number rises along each.
-    pub fn edges(&self) -> impl Iterator<Item = (Key, i32)> {
-        self.edges.iter().copied()
-    }
-
-    /// Area of the patches, as the number of edges that they cross; edges crossed several times count as often.
-    pub fn area(&self) -> u64 {
-        self.edges.iter().map(|edge| u64::from(edge.1.unsigned_abs())).sum()
-    }
-
-    /// By how much the winding number rises along an edge.
-    fn jump(&self, edge: Key) -> i32 {
-        self.edges.binary_search_by_key(&edge, |e| e.0).map_or(0, |i| self.edges[i].1)
-    }
-}
+use std::cmp::Ordering;
 
 /// The outcome of [`winding_signs`].
 #[derive(Debug)]
@@ -93,17 +45,12 @@ pub struct Winding {
     pub clipped: u64,
 }
 
-/// Winding numbers above this are inside, give or take [`HOLD`].
-const THRESHOLD: f32 = 0.5;
-/// Beside a flat sheet the winding number comes as near to one half as the sheet is large, on one side from below, and inside of a solid
-/// from above. What is rounded must not make a crust of the sheet, or a slit in the solid. So points for which patches and hits together
-/// say outside must be above the threshold by this, and those for which they say inside may be below it. In holes it moves the surface by
-/// a thirtieth of their radius at most.
-const HOLD: f32 = 1.0 / 64.0;
-/// The same beside a hit. At the rim of a sheet, the steps of the grid are seen under an angle.
-const HOLD_AT_HITS: f32 = 1.0 / 8.0;
-/// Values of coarser levels are trusted that far.
-const MARGIN: f32 = 0.1;
+/// Estimates that may be wrong by more decide too little of a block to be worth their while.
+const MOST: f64 = 0.25;
+/// Half the points along the side of a block.
+const HALF: u32 = 2;
+/// Winding numbers above this are inside.
+const THRESHOLD: f64 = 0.5;
 
 /// Inside and outside of a surface with boundary.
 ///
@@ -111,124 +58,86 @@ const MARGIN: f32 = 0.1;
 /// `Cancelled`.
 pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Progress) -> Result<Winding> {
     progress.begin(Stage::Sign, 0);
+    let depth = hits.edges().depth();
     let bricks = Bricks::of_surface(hits, patches);
     let mut rows = bricks.rows();
     rows.walk(|i| bricks.steps(i), |_| ());
-    let depth = hits.edges().depth();
-    let wanted = |key, range| {
-        let Some((first, side)) = world::in_root(depth, key) else { return false };
-        let cell = |at| Key::cell(depth - 3, at).expect("in the root");
-        let (first, last) = (cell(first), cell(first.map(|c| c + side - 1)));
-        let number = bricks.none_between(first, last).then(|| rows.between(first, depth));
-        may_pass(number, range)
-    };
-    let field = field::solve(depth, patches.sources(depth), patches.dipole(depth), wanted, progress)?;
+    let parts = Parts::of(&bricks, &rows);
     check(progress)?;
 
-    // The same again with all bricks through which the surface may run, and those before them, which own edges into them.
-    let bricks = bricks.with(field.finest_bricks().iter().filter_map(|&key| world::to_root(depth, key)));
+    // The same again with all rough bricks, and those before them, which own edges into them.
+    let bricks = bricks.with(parts.rough());
     let mut rows = bricks.rows();
-    let layers = rows.walk(
+    let numbers = Angles::new(hits, patches);
+    let made = rows.walk(
         |i| bricks.steps(i),
         |i| {
-            let key = world::from_root(depth, bricks.keys[i]);
-            let values = field.values(key);
-            let (value, at_hits) = if values.is_some() {
-                (0.0, ends_of_hits(hits, bricks.keys[i]))
-            } else {
-                (field.middle(key), Plane::EMPTY)
-            };
-            Above { values, value, at_hits, inside: Plane::EMPTY }
+            let key = bricks.keys[i];
+            Points { angles: &numbers, key, least: parts.least(key), numbers: Vec::new(), inside: Plane::EMPTY }
         },
     );
+    check(progress)?;
+    let uniform = |key| parts.least(key).is_some_and(|least| rows.between(key, depth) >= least);
+    let mut signs: Vec<(Key, Plane)> = bricks.keys.iter().copied().zip(made.iter().map(|made| made.0)).collect();
+    let ties = made.into_iter().enumerate().flat_map(|(i, (_, ties))| ties.into_iter().map(move |local| (i, local)));
+    break_ties(depth, &mut signs, &ties.collect::<Vec<_>>(), uniform);
     let mut clipped = 0;
-    let signs: Vec<(Key, Plane)> = bricks
-        .keys
-        .iter()
-        .zip(layers)
-        .map(|(&key, inside)| {
-            let (inside, off) = clip(depth, key, inside);
-            clipped += off;
-            (key, inside)
-        })
-        .collect();
-    let uniform = |key| rows.between(key, depth) >= least(field.middle(world::from_root(depth, key)));
+    for (key, inside) in &mut signs {
+        clipped += clip(depth, *key, inside);
+    }
     let edges = hits.edges();
-    let rule = if patches.reversed { Rule::Negative } else { Rule::Positive };
+    let rule = if patches.reversed() { Rule::Negative } else { Rule::Positive };
     let octree = SignedOctree::from_signs(depth, edges.with_normals(), &signs, uniform, |i, crossed, out| {
         let (key, inside) = &signs[i];
         let origin = lattice_point(depth, *key);
         let elsewhere = |axis, local: Local| {
             let c = local.coords();
-            Smooth { field: &field, patches, depth }.sample(
-                axis,
-                std::array::from_fn(|a| origin[a] + c[a]),
-                edges.with_normals(),
-            )
+            numbers.sample(axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
         };
         push_samples(hits, *key, inside, crossed, rule, elsewhere, out);
     });
     Ok(Winding { octree, clipped })
 }
 
-/// The winding number at any lattice point, slowly.
-#[cfg(test)]
-pub(super) fn numbers(hits: &OrientedHits, patches: &Patches) -> impl Fn([u32; 3]) -> f64 {
-    let depth = hits.edges().depth();
-    let silent = &crate::progress::Silent;
-    let field = field::solve(depth, patches.sources(depth), patches.dipole(depth), |_, _| false, silent);
-    let field = field.expect("not cancelled");
-    // Whole numbers from jumps along x, added up point by point.
-    let mut jumps: Vec<([u32; 3], i32)> = Vec::new();
-    for brick in hits.edges().bricks().iter() {
-        let origin = hits.edges().origin(brick);
-        hits.for_edges(brick, |axis, local, of_edge| {
-            let c = local.coords();
-            let net = of_edge.iter().map(|hit| if patches.reversed { -hit.jump() } else { hit.jump() }).sum();
-            jumps.extend((axis == Axis::X).then(|| (std::array::from_fn(|a| origin[a] + c[a]), net)));
+/// The least whole number that is inside where the angle is `angle`.
+fn least(angle: f64) -> i32 {
+    (THRESHOLD - angle).floor() as i32 + 1
+}
+
+/// Lets ties agree with their neighbours if these agree with each other. `ties` are sorted.
+fn break_ties(depth: u32, signs: &mut [(Key, Plane)], ties: &[(usize, Local)], uniform: impl Fn(Key) -> bool) {
+    let place = |brick: Key| signs.binary_search_by_key(&brick, |sign| sign.0);
+    // `None` of a tie.
+    let decided = |brick: Key, local: Local| match place(brick) {
+        Ok(i) if ties.binary_search(&(i, local)).is_ok() => None,
+        Ok(i) => Some(signs[i].1.get(local)),
+        Err(_) => Some(uniform(brick)),
+    };
+    let side = 1 << depth;
+    let turned = ties.iter().filter(|&&(i, local)| {
+        let (origin, c) = (lattice_point(depth, signs[i].0), local.coords());
+        let mut beside = Face::ALL.into_iter().filter_map(|face| {
+            let mut at: [u32; 3] = std::array::from_fn(|a| origin[a] + c[a]);
+            let a = face.axis().index();
+            at[a] = if face.is_high() { at[a] + 1 } else { at[a].wrapping_sub(1) };
+            if at[a] >= side {
+                return Some(false);
+            }
+            let brick = Key::cell(depth - 3, at.map(|c| c >> 3)).expect("in the root");
+            decided(brick, Local::new(at[0], at[1], at[2]))
         });
-    }
-    jumps.extend(patches.ends(depth).filter(|end| end.1 == Axis::X).map(|([start, _], _, jump)| (start, jump)));
-    let sign = if patches.reversed { -1.0 } else { 1.0 };
-    move |at| {
-        let before = jumps.iter().filter(|(p, _)| p[1..] == at[1..] && p[0] < at[0]).map(|j| j.1).sum::<i32>();
-        sign * (f64::from(before) - f64::from(field.at_point(depth, at)))
-    }
-}
-
-/// Whether a point is inside, from its whole number and its smooth part.
-fn is_inside(number: i32, smooth: f32, beside_hit: bool) -> bool {
-    let hold = if beside_hit { HOLD_AT_HITS } else { HOLD };
-    number as f32 - smooth > THRESHOLD + if number > 0 { -hold } else { hold }
-}
-
-/// Whether the final surface may run where the smooth part is in a range, and the whole number is known or not.
-fn may_pass(number: Option<i32>, [low, high]: [f32; 2]) -> bool {
-    let (low, high) = (least(low - MARGIN), least(high + MARGIN));
-    match number {
-        Some(number) => (low..high).contains(&number),
-        None => low != high,
+        let mine = signs[i].1.get(local);
+        beside.next().is_some_and(|first| first != mine && beside.all(|other| other == first))
+    });
+    for (i, local) in turned.copied().collect::<Vec<_>>() {
+        signs[i].1.toggle(local);
     }
 }
 
-/// The least whole number that is inside where the smooth part is not near to what decides.
-fn least(smooth: f32) -> i32 {
-    (smooth + THRESHOLD).floor() as i32 + 1
-}
-
-/// The points of a brick at which a hit edge starts or ends.
-fn ends_of_hits(hits: &OrientedHits, brick: Key) -> Plane {
-    let hit = |key: Option<Key>| hits.edges().brick_or_nothing(key).crossed;
-    let [x, y, z] = hit(Some(brick));
-    let [px, py, pz] = Axis::ALL.map(|axis| hit(brick.neighbour(Face::new(axis, false)))[axis.index()]);
-    x | y | z | x.at_minus_x(&px) | y.at_minus_y(&py) | z.at_minus_z(&pz)
-}
-
-/// Makes the points on the root's boundary outside. Also returns how many points next to it are inside.
-fn clip(depth: u32, brick: Key, mut inside: Plane) -> (Plane, u64) {
+/// Makes the points on the root's boundary outside. Returns how many points on it or next to it were inside.
+fn clip(depth: u32, brick: Key, inside: &mut Plane) -> u64 {
     let mut clipped = 0;
-    let coords = lattice_point(depth, brick);
-    for (a, at) in coords.into_iter().enumerate() {
+    for (a, at) in lattice_point(depth, brick).into_iter().enumerate() {
         for (end, layer) in [(0, 0), ((1 << depth) - 8, 7)] {
             if at == end {
                 let beside = (0..512).map(Local::from_index).filter(|p| p.coords()[a] == layer && inside.get(*p));
@@ -240,226 +149,377 @@ fn clip(depth: u32, brick: Key, mut inside: Plane) -> (Plane, u64) {
             }
         }
     }
-    (inside, clipped)
+    clipped
 }
 
-/// The points of a brick whose winding number is inside.
-struct Above<'a> {
-    /// The smooth part, point by point.
-    values: Option<&'a Values>,
-    /// Where that is not known, the same for all.
-    value: f32,
-    /// The points at an end of a hit edge, if values are known.
-    at_hits: Plane,
-    inside: Plane,
-}
-
-impl Layer<Plane> for Above<'_> {
-    fn at(&mut self, x: usize, counter: &Counter) {
-        let Some(values) = self.values else {
-            self.inside.0[x] = counter.at_least(least(self.value));
-            return;
-        };
-        let numbers = counter.values();
-        let at_hits = self.at_hits.0[x];
-        let bit = |line: usize| {
-            let smooth = f32::from(values[64 * x + line]) / UNIT;
-            u64::from(is_inside(numbers[line], smooth, at_hits >> line & 1 == 1))
-        };
-        self.inside.0[x] = (0..64).fold(0, |word, line| word | bit(line) << line);
-    }
-
-    fn end(self) -> Plane {
-        self.inside
-    }
-}
-
-/// Bricks and the jumps along their edges, those of patches included.
+/// Bricks, and the jumps along their edges, those of patches included.
 struct Bricks<'a> {
     hits: &'a OrientedHits,
     patches: &'a Patches,
     /// Sorted.
     keys: Vec<Key>,
-    /// Where the edges of each brick begin among those of the patches, and the end.
-    firsts: Vec<u32>,
 }
 
 impl<'a> Bricks<'a> {
-    /// All bricks with hits or patches.
+    /// All bricks with hits of surface or patches.
     fn of_surface(hits: &'a OrientedHits, patches: &'a Patches) -> Self {
-        let depth = hits.edges().depth();
-        let mut of_patches: Vec<Key> = patches.edges.iter().map(|&(edge, _)| brick_of(depth, edge)).collect();
-        of_patches.dedup();
-        let keys = hits.edges().bricks().iter().map(|brick| brick.key).collect();
-        Bricks { hits, patches, keys, firsts: Vec::new() }.with(of_patches.into_iter())
+        let of = |hits: &OrientedHits| hits.edges().bricks().iter().map(|brick| brick.key).collect::<Vec<_>>();
+        let bricks = Bricks { hits, patches, keys: of(hits) };
+        bricks.and(of(&patches.hits))
+    }
+
+    fn and(mut self, more: Vec<Key>) -> Self {
+        self.keys.extend(more);
+        self.keys.par_sort_unstable();
+        self.keys.dedup();
+        self
     }
 
     /// More bricks, and those before them along each axis.
     fn with(self, more: impl Iterator<Item = Key>) -> Self {
-        let mut keys = self.keys;
-        keys.extend(more.flat_map(|key| {
-            let before = Axis::ALL.into_iter().filter_map(move |axis| key.neighbour(Face::new(axis, false)));
-            before.chain([key])
-        }));
-        keys.par_sort_unstable();
-        keys.dedup();
-        // Edges are sorted by their middles: those of a brick stand together, and bricks in order.
-        let depth = self.hits.edges().depth();
-        let mut edges = self.patches.edges.iter().map(|edge| brick_of(depth, edge.0)).peekable();
-        let mut count = 0;
-        let mut firsts = Vec::with_capacity(keys.len() + 1);
-        for &key in &keys {
-            firsts.push(count);
-            while edges.next_if_eq(&key).is_some() {
-                count += 1;
-            }
-        }
-        firsts.push(count);
-        Bricks { keys, firsts, ..self }
+        let before = |key: Key| Axis::ALL.into_iter().filter_map(move |axis| key.neighbour(Face::new(axis, false)));
+        self.and(more.flat_map(|key| before(key).chain([key])).collect())
     }
 
     fn rows(&self) -> Rows {
         Rows::new(self.hits.edges().depth(), self.keys.par_iter().copied())
     }
 
-    /// Whether none of them lies between two, in their order.
-    fn none_between(&self, first: Key, last: Key) -> bool {
-        let next = self.keys.partition_point(|&key| key < first);
-        self.keys.get(next).is_none_or(|&key| key > last)
-    }
-
     /// The jumps along the x-edges of brick `i`.
     fn steps(&self, i: usize) -> Steps {
-        let key = self.keys[i];
-        let edges = self.hits.edges();
-        let mut steps = edges.find(key).map_or_else(Steps::default, |place| steps_of(self.hits, place));
-        if self.patches.reversed {
-            std::mem::swap(&mut steps.rises, &mut steps.falls);
-            steps.more.iter_mut().for_each(|(_, jump)| *jump = -*jump);
+        let of = |hits: &OrientedHits| hits.edges().find(self.keys[i]).map(|place| steps_of(hits, place));
+        let mut steps = of(self.hits).unwrap_or_default();
+        if self.patches.reversed() {
+            steps.turn();
         }
-        let (depth, before) = (edges.depth(), steps.more.len());
-        for &(edge, jump) in &self.patches.edges[self.firsts[i] as usize..self.firsts[i + 1] as usize] {
-            if edge.dir() == Axis::X.into() {
-                let [x, y, z] = lattice_point(depth, edge);
-                steps.more.push((Local::new(x, y, z), jump));
-            }
-        }
-        if steps.more.len() > before {
-            steps.more.sort_unstable();
+        if let Some(more) = of(&self.patches.hits) {
+            steps.add(more);
         }
         steps
     }
+}
 
-    /// Sign and size of the volume that hits and patches enclose, in cells.
-    fn volume(&self) -> i64 {
-        let volume = |i: usize| {
-            let origin = i64::from(lattice_point(self.hits.edges().depth(), self.keys[i])[0]);
-            let Steps { rises, falls, more } = self.steps(i);
-            let net = |x: usize| i64::from(falls.0[x].count_ones()) - i64::from(rises.0[x].count_ones());
-            let single: i64 = (0..8).map(|x| net(x) * (origin + x as i64)).sum();
-            single - more.iter().map(|&(p, jump)| i64::from(jump) * (origin + i64::from(p.coords()[0]))).sum::<i64>()
+/// The root, divided into calm cells and rough bricks.
+struct Parts {
+    /// The first brick of each, in order of keys, and the least number that is inside; none for rough bricks.
+    parts: Vec<(Key, Option<i32>)>,
+}
+
+impl Parts {
+    /// `rows` have been walked.
+    fn of(bricks: &Bricks<'_>, rows: &Rows) -> Parts {
+        let keys = |hits: &OrientedHits| hits.edges().bricks().iter().map(|brick| brick.key).collect();
+        let divide = Divide {
+            depth: bricks.hits.edges().depth(),
+            angles: Angles::new(bricks.hits, bricks.patches),
+            surface: keys(bricks.hits),
+            spanned: keys(&bricks.patches.hits),
+            rows,
         };
-        (0..self.keys.len()).into_par_iter().map(volume).sum()
+        Parts { parts: divide.in_parallel(Key::ROOT) }
+    }
+
+    fn rough(&self) -> impl Iterator<Item = Key> {
+        self.parts.iter().filter(|part| part.1.is_none()).map(|part| part.0)
+    }
+
+    /// The least number that is inside in a brick, if it is calm.
+    fn least(&self, brick: Key) -> Option<i32> {
+        let next = self.parts.partition_point(|part| part.0 <= brick);
+        self.parts[next - 1].1
     }
 }
 
-/// The finest brick that owns an edge.
-fn brick_of(depth: u32, edge: Key) -> Key {
-    Key::cell(depth - 3, lattice_point(depth, edge).map(|c| c >> 3)).expect("edges lie in bricks")
-}
-
-impl Patches {
-    /// Both ends of each edge.
-    fn ends(&self, depth: u32) -> impl Iterator<Item = ([[u32; 3]; 2], Axis, i32)> {
-        self.edges.iter().map(move |&(edge, jump)| {
-            let axis = edge.dir().axes().next().expect("an edge has an axis");
-            let start = lattice_point(depth, edge);
-            let mut end = start;
-            end[axis.index()] += 1;
-            ([start, end], axis, jump)
-        })
-    }
-
-    /// The sources of the smooth part.
-    fn sources(&self, depth: u32) -> Vec<(Key, Local, Axis, i32)> {
-        let at = |[x, y, z]: [u32; 3], axis, jump| (world::at_point(depth, [x, y, z]), Local::new(x, y, z), axis, jump);
-        self.ends(depth).flat_map(|([start, end], axis, jump)| [at(start, axis, jump), at(end, axis, -jump)]).collect()
-    }
-
-    /// What they are from afar.
-    fn dipole(&self, depth: u32) -> Dipole {
-        let (mut area, mut middle, mut weight) = ([0i64; 3], [0i64; 3], 0i64);
-        for ([start, end], axis, jump) in self.ends(depth) {
-            area[axis.index()] += i64::from(jump);
-            weight += 2 * i64::from(jump.abs());
-            (0..3).for_each(|a| middle[a] += i64::from(start[a] + end[a]) * i64::from(jump.abs()));
-        }
-        let root = f64::from(1u32 << depth);
-        let centre = DVec3::from(middle.map(|c| root + c as f64 / weight.max(1) as f64));
-        Dipole { area: DVec3::from(area.map(|c| c as f64)), centre }
-    }
-}
-
-/// Crossings where no face is.
-struct Smooth<'a> {
-    field: &'a Field,
-    patches: &'a Patches,
+struct Divide<'a> {
     depth: u32,
+    angles: Angles<'a>,
+    /// Bricks with hits of the surface, sorted.
+    surface: Vec<Key>,
+    /// Bricks with hits of patches, sorted.
+    spanned: Vec<Key>,
+    rows: &'a Rows,
 }
 
-impl Smooth<'_> {
-    /// Where and how steeply the surface crosses the edge that starts at `start`.
-    fn sample(&self, axis: Axis, start: [u32; 3], with_normals: bool) -> Sample {
-        let mut end = start;
-        end[axis.index()] += 1;
-        let jump = self.jump(start, axis) as f32;
-        let (a, b) = (self.field.at_point(self.depth, start), self.field.at_point(self.depth, end) - jump);
-        // Along the edge the winding number is this or that whole number less what goes from a to b: the one with which it passes.
-        let number = (THRESHOLD + 0.5 * (a + b)).round();
-        let t = (number - THRESHOLD - a) / (b - a);
-        let position = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 };
-        let normal = if with_normals { self.normal(axis, start, end) } else { DVec3::ZERO };
-        Sample::new(
-            (position * 65535.0) as u16,
-            if with_normals { NormalCode::encode(axis, normal.to_array()).0 } else { 0 },
-        )
-    }
-
-    fn jump(&self, start: [u32; 3], axis: Axis) -> i32 {
-        self.patches.jump(finest_element(self.depth, start, axis.into()))
-    }
-
-    /// By how much the smooth part rises along an edge, without the patches' jump: minus that of the winding number without hits.
-    fn slope(&self, start: [u32; 3], axis: Axis) -> f64 {
-        let mut end = start;
-        end[axis.index()] += 1;
-        let rise = self.field.at_point(self.depth, end) - self.field.at_point(self.depth, start);
-        f64::from(rise - self.jump(start, axis) as f32)
-    }
-
-    /// The gradient at the middle of an edge, but not along the surface: the component along the edge is at least a little.
-    fn normal(&self, axis: Axis, start: [u32; 3], end: [u32; 3]) -> DVec3 {
-        let mut normal = DVec3::ZERO;
-        for u in axis.others() {
-            let mut sum = 0.0;
-            let mut count = 0.0;
-            for mut p in [start, end] {
-                for _ in 0..2 {
-                    if p[u.index()] < 1 << self.depth {
-                        sum += self.slope(p, u);
-                        count += 1.0;
-                    }
-                    if p[u.index()] == 0 {
-                        break;
-                    }
-                    p[u.index()] -= 1;
-                }
-            }
-            normal[u.index()] = if count > 0.0 { sum / count } else { 0.0 };
+impl Divide<'_> {
+    /// The parts of a cell, the upper levels by several threads.
+    fn in_parallel(&self, cell: Key) -> Vec<(Key, Option<i32>)> {
+        let level = cell.level().expect("a cell");
+        if level < 3.min(self.depth - 3) && self.calm(cell).is_none() {
+            let parts = cell.children().into_par_iter().map(|child| self.in_parallel(child));
+            return parts.flatten_iter().collect();
         }
-        let along = self.slope(start, axis);
-        let least = 1e-3 * normal.abs().max_element().max(1e-9);
-        normal[axis.index()] = if along.abs() < least { least.copysign(along) } else { along };
-        normal
+        let mut out = Vec::new();
+        self.push(cell, &mut out);
+        out
+    }
+
+    fn push(&self, cell: Key, out: &mut Vec<(Key, Option<i32>)>) {
+        let calm = self.calm(cell);
+        if calm.is_some() || cell.level() == Some(self.depth - 3) {
+            out.push((self.ends(cell)[0], calm));
+        } else {
+            cell.children().into_iter().for_each(|child| self.push(child, out));
+        }
+    }
+
+    /// The first and the last brick of a cell.
+    fn ends(&self, cell: Key) -> [Key; 2] {
+        let first = lattice_point(self.depth, cell).map(|c| c >> 3);
+        let side = 1 << (self.depth - 3 - cell.level().expect("a cell"));
+        [first, first.map(|c| c + side - 1)].map(|at| Key::cell(self.depth - 3, at).expect("in the root"))
+    }
+
+    /// The least number that is inside, if it is the same in all of the cell.
+    fn calm(&self, cell: Key) -> Option<i32> {
+        let [first, last] = self.ends(cell);
+        let any = |keys: &[Key]| keys.get(keys.partition_point(|&key| key < first)).is_some_and(|&key| key <= last);
+        if any(&self.spanned) {
+            return None;
+        }
+        let half = 1 << (self.depth - 1 - cell.level().expect("a cell"));
+        let middle = lattice_point(self.depth, cell).map(|c| c + half);
+        let radius = f64::from(half) * 3f64.sqrt();
+        if self.angles.are_minor(middle, radius) {
+            return Some(least(0.0));
+        }
+        let [first_order, _] = self.angles.steepness(middle, radius);
+        let reach = first_order * radius + ERROR;
+        if reach.is_infinite() {
+            return None;
+        }
+        let angle = self.angles.at(middle);
+        if any(&self.surface) {
+            let bounds = [least(angle - reach), least(angle + reach)];
+            return (bounds[0] == bounds[1]).then_some(bounds[0]);
+        }
+        let number = f64::from(self.rows.between(first, self.depth)) + angle;
+        ((number - THRESHOLD).abs() > reach).then(|| least(angle))
+    }
+}
+
+/// The angle of the patches, by cells.
+struct Angles<'a> {
+    hits: &'a OrientedHits,
+    patches: &'a Patches,
+    /// log2 of fixed-point units in a cell.
+    shift: u32,
+}
+
+impl<'a> Angles<'a> {
+    fn new(hits: &'a OrientedHits, patches: &'a Patches) -> Self {
+        Angles { hits, patches, shift: FINE_BITS - hits.edges().depth() }
+    }
+
+    fn fine(&self, point: [u32; 3]) -> [i32; 3] {
+        point.map(|c| (c << self.shift) as i32)
+    }
+
+    fn unit(&self) -> f64 {
+        f64::from(1u32 << self.shift)
+    }
+
+    fn at(&self, point: [u32; 3]) -> f64 {
+        self.patches.span.angle(self.fine(point))
+    }
+
+    /// The angle at a point, and how it changes by the cell.
+    fn tangent(&self, point: [u32; 3]) -> (f64, DVec3) {
+        let (angle, slope) = self.patches.span.angle_and_slope(self.fine(point));
+        (angle, slope * self.unit())
+    }
+
+    /// Whether the amount of the angle is below one half, so many cells around a point, by the size of patches alone.
+    fn are_minor(&self, point: [u32; 3], radius: f64) -> bool {
+        let at = DVec3::from(self.fine(point).map(f64::from));
+        self.patches.span.is_minor(at, radius * self.unit())
+    }
+
+    /// Bounds of the angle's derivatives by the cell, so many cells around a point.
+    fn steepness(&self, point: [u32; 3], radius: f64) -> [f64; 2] {
+        let (at, unit) = (DVec3::from(self.fine(point).map(f64::from)), self.unit());
+        let [first, second] = self.patches.span.steepness(at, radius * unit);
+        [first * unit, second * unit * unit]
+    }
+
+    /// Inside points of a rough brick from its whole numbers, and ties.
+    fn inside(&self, brick: Key, numbers: &[[i32; 64]]) -> (Plane, Vec<Local>) {
+        let edges = self.hits.edges();
+        let net = edges.find(brick).map(|place| Net::of(self.hits, &edges.bricks()[place])).unwrap_or_default();
+        let [x, y, z] = self.patches.hits.edges().brick_or_nothing(Some(brick)).crossed;
+        let mut rough = Rough {
+            angles: self,
+            origin: lattice_point(edges.depth(), brick),
+            numbers,
+            net,
+            spanned: x | y | z,
+            inside: Plane::EMPTY,
+            ties: Vec::new(),
+            view: View::default(),
+        };
+        for block in 0..8 {
+            rough.block([block >> 2 & 1, block >> 1 & 1, block & 1].map(|bit| 2 * HALF * bit));
+        }
+        rough.ties.sort_unstable();
+        (rough.inside, rough.ties)
+    }
+
+    /// Where and how steeply w passes one half on the edge that starts at `start`.
+    fn sample(&self, axis: Axis, start: [u32; 3], with_normals: bool) -> Sample {
+        let a = axis.index();
+        let mut middle = self.fine(start);
+        middle[a] += 1 << (self.shift - 1);
+        let (angle, slope) = self.patches.span.angle_and_slope(middle);
+        let slope = slope * self.unit();
+        // Up to a whole number: the nearest that is possible.
+        let above = angle - THRESHOLD - (angle - THRESHOLD).round();
+        let straight = 0.5 - above / slope[a];
+        let position = if (-0.5..=1.5).contains(&straight) { straight } else { self.between(axis, start) };
+        let offset = (position.clamp(0.0, 1.0) * 65535.0) as u16;
+        if !with_normals {
+            return Sample::new(offset, 0);
+        }
+        // Not along the edge.
+        let least = 1e-3 * slope.abs().max_element().max(1e-30);
+        let mut normal = slope.to_array();
+        if normal[a].abs() < least {
+            normal[a] = least.copysign(normal[a]);
+        }
+        Sample::new(offset, NormalCode::encode(axis, normal).0)
+    }
+
+    /// The same by values at both ends: next to the boundary.
+    fn between(&self, axis: Axis, start: [u32; 3]) -> f64 {
+        let mut end = start;
+        end[axis.index()] += 1;
+        let from = self.at(start);
+        let to = self.at(end);
+        let to = to + (from - to).round();
+        let passed = (0.5 * (from + to) - THRESHOLD).round() + THRESHOLD;
+        let position = (passed - from) / (to - from);
+        if position.is_finite() { position } else { 0.5 }
+    }
+}
+
+/// A rough brick at work.
+struct Rough<'a> {
+    angles: &'a Angles<'a>,
+    origin: [u32; 3],
+    numbers: &'a [[i32; 64]],
+    /// Jumps of the surface.
+    net: Net,
+    /// Points at which an edge starts that a patch crosses.
+    spanned: Plane,
+    inside: Plane,
+    ties: Vec<Local>,
+    /// Of the block at work.
+    view: View,
+}
+
+impl Rough<'_> {
+    /// Decides about a block of 4 x 4 x 4 points.
+    fn block(&mut self, low: [u32; 3]) {
+        let middle = low.map(|c| c + HALF);
+        let at = self.point(middle);
+        let radius = f64::from(HALF) * 3f64.sqrt();
+        let locals = (0..64u32).map(|i| [low[0] + (i >> 4), low[1] + (i >> 2 & 3), low[2] + (i & 3)]);
+        if !locals.clone().any(|[x, y, z]| self.spanned.get(Local::new(x, y, z))) && self.angles.are_minor(at, radius) {
+            for local in locals {
+                self.decide(local, f64::from(self.number(local)) - THRESHOLD, 0.0);
+            }
+            return;
+        }
+        let [_, second] = self.angles.steepness(at, radius);
+        let reach = |squared: f64| 0.5 * second * squared + ERROR;
+        if reach(radius * radius) > MOST {
+            let span = &self.angles.patches.span;
+            let angles = self.view.angles(span, self.angles.fine(at), 1 << self.angles.shift);
+            for (local, angle) in locals.zip(angles) {
+                let above = f64::from(self.number(local)) + f64::from(angle) - THRESHOLD;
+                self.decide(local, above, VIEW_ERROR);
+            }
+            return;
+        }
+        let (angle, slope) = self.angles.tangent(at);
+        let number = self.number(middle);
+        for local in locals {
+            let from_middle = DVec3::from(std::array::from_fn(|a| f64::from(local[a]) - f64::from(middle[a])));
+            let number = f64::from(number + self.jumps(middle, local));
+            let above = number + angle + slope.dot(from_middle) - THRESHOLD;
+            self.decide(local, above, reach(from_middle.length_squared()));
+        }
+    }
+
+    /// Enters a point of which w is so much above one half, give or take some.
+    fn decide(&mut self, at: [u32; 3], above: f64, give: f64) {
+        // What is not known is looked at.
+        if above.abs().partial_cmp(&give) != Some(Ordering::Greater) {
+            self.point_itself(at);
+        } else if above > 0.0 {
+            self.inside.set(Local::new(at[0], at[1], at[2]));
+        }
+    }
+
+    fn point(&self, local: [u32; 3]) -> [u32; 3] {
+        std::array::from_fn(|a| self.origin[a] + local[a])
+    }
+
+    fn number(&self, local: [u32; 3]) -> i32 {
+        self.numbers[local[0] as usize][(8 * local[1] + local[2]) as usize]
+    }
+
+    /// By how much the winding number jumps on the way from one point to another, along x, y and then z.
+    fn jumps(&self, from: [u32; 3], to: [u32; 3]) -> i32 {
+        let (mut sum, mut at) = (0, from);
+        for axis in Axis::ALL {
+            let a = axis.index();
+            let up = at[a] < to[a];
+            while at[a] != to[a] {
+                let next = if up { at[a] + 1 } else { at[a] - 1 };
+                let mut start = at;
+                start[a] = start[a].min(next);
+                let jump = self.net.at(axis, Local::new(start[0], start[1], start[2]));
+                sum += if up { jump } else { -jump };
+                at[a] = next;
+            }
+        }
+        if self.angles.patches.reversed() { -sum } else { sum }
+    }
+
+    /// Looks at one point.
+    fn point_itself(&mut self, at: [u32; 3]) {
+        let local = Local::new(at[0], at[1], at[2]);
+        let above = f64::from(self.number(at)) + self.angles.at(self.point(at)) - THRESHOLD;
+        if above.abs() <= ERROR {
+            self.ties.push(local);
+        }
+        if above > 0.0 {
+            self.inside.set(local);
+        }
+    }
+}
+
+/// What becomes of the points of a brick.
+struct Points<'a> {
+    angles: &'a Angles<'a>,
+    key: Key,
+    /// The least number that is inside; none in a rough brick.
+    least: Option<i32>,
+    numbers: Vec<[i32; 64]>,
+    inside: Plane,
+}
+
+impl Layer<(Plane, Vec<Local>)> for Points<'_> {
+    fn at(&mut self, x: usize, counter: &Counter) {
+        match self.least {
+            Some(least) => self.inside.0[x] = counter.at_least(least),
+            None => self.numbers.push(counter.values()),
+        }
+    }
+
+    fn end(self) -> (Plane, Vec<Local>) {
+        match self.least {
+            Some(_) => (self.inside, Vec::new()),
+            None => self.angles.inside(self.key, &self.numbers),
+        }
     }
 }

@@ -21,9 +21,14 @@ fn hits_of(mesh: &Mesh, depth: u32) -> (OrientedHits, Frame) {
     (hits, frame)
 }
 
+fn patches_of(mesh: &Mesh, frame: &Frame) -> Patches {
+    let boundary = Boundary::of(&mut &*mesh, frame, 0, &Silent).expect("in memory");
+    Patches::new(&boundary, frame.depth(), 0, &Silent).expect("not cancelled")
+}
+
 fn solve(mesh: &Mesh, depth: u32) -> (Winding, Frame) {
     let (hits, frame) = hits_of(mesh, depth);
-    let patches = Patches::new(&hits, &circulations(&hits), &Silent).expect("not cancelled");
+    let patches = patches_of(mesh, &frame);
     let winding = winding_signs(&hits, &patches, &Silent).expect("not cancelled");
     assert_eq!(winding.octree.validate(), Ok(()));
     (winding, frame)
@@ -71,7 +76,7 @@ fn sieve(mesh: &Mesh) -> Mesh {
 }
 
 /// The net jump of every edge that has one.
-fn jumps(hits: &OrientedHits) -> BTreeMap<Key, i32> {
+fn jumps_of(hits: &OrientedHits) -> BTreeMap<Key, i32> {
     let mut jumps = BTreeMap::new();
     for brick in hits.edges().bricks().iter() {
         let origin = hits.edges().origin(brick);
@@ -111,15 +116,16 @@ fn soup(corners: &[[f64; 3]]) -> Mesh {
     Mesh { points, faces: faces.iter().map(|f| &f[..]).collect() }
 }
 
-/// Patches without whatever made them cancel: hits and patches together have no circulation.
-fn assert_spanned(hits: &OrientedHits) {
-    let mut jumps = jumps(hits);
-    let found = circulations(hits);
-    assert!(found == plain_circulations(&jumps));
-    let patches = Patches::new(hits, &found, &Silent).expect("not cancelled");
-    for (edge, jump) in patches.edges() {
+/// Hits and patches together have no circulation.
+fn assert_spanned(mesh: &Mesh, depth: u32) {
+    let (hits, frame) = hits_of(mesh, depth);
+    let mut jumps = jumps_of(&hits);
+    assert!(circulations(&hits) == plain_circulations(&jumps));
+    let patches = patches_of(mesh, &frame);
+    for (edge, jump) in jumps_of(patches.hits()) {
         *jumps.entry(edge).or_insert(0) += if patches.reversed() { -jump } else { jump };
     }
+    jumps.retain(|_, jump| *jump != 0);
     assert!(plain_circulations(&jumps).is_empty());
 }
 
@@ -129,8 +135,7 @@ proptest! {
     #[test]
     fn any_soup_is_spanned_and_signed(corners in prop::collection::vec(prop::array::uniform3(0.0..1.0), 3..60)) {
         let mesh = soup(&corners[..corners.len() / 3 * 3]);
-        let (hits, _) = hits_of(&mesh, 4);
-        assert_spanned(&hits);
+        assert_spanned(&mesh, 4);
         let (winding, _) = solve(&mesh, 4);
         prop_assert!(winding.octree.crossings().odd_faces().is_empty());
     }
@@ -177,9 +182,9 @@ proptest! {
     }
 }
 
-/// The generalised winding number is that of the triangles, a little away from the surface: bowls, sieves, seams, holes, sheets.
+/// Inside is where the solid angles of the triangles come to more than one half: bowls, sieves, seams, holes, soups.
 #[test]
-fn numbers_are_those_of_the_solid_angles() {
+fn signs_are_those_of_the_solid_angles() {
     let ball = sample::build("sphere", 1).expect("a sample");
     let bounds = (&ball).bounds().expect("in memory");
     let (centre, radius) = (bounds.center(), 0.5 * bounds.extent().x);
@@ -204,24 +209,51 @@ fn numbers_are_those_of_the_solid_angles() {
         ("sieve", sieve(&ball)),
     ];
     for (name, mesh) in cases {
-        let depth = 6;
-        let (hits, frame) = hits_of(&mesh, depth);
-        let patches = Patches::new(&hits, &circulations(&hits), &Silent).expect("not cancelled");
-        let numbers = open::numbers(&hits, &patches);
-        let triangles = triangles(&mesh);
-        let near = |p: DVec3| ((p - centre).length() - radius).abs() < 2.0 * frame.cell_size();
-        let points: Vec<[u32; 3]> = (0..17u32.pow(3)).map(|i| [i / 289, i / 17 % 17, i % 17].map(|c| 4 * c)).collect();
-        let errors: Vec<(f64, [u32; 3])> = points
-            .par_iter()
-            .filter_map(|&at| {
-                let p = frame.to_model(DVec3::from(at.map(f64::from)));
-                (!near(p)).then(|| ((numbers(at) - oracle(&triangles, p)).abs(), at))
-            })
-            .collect();
-        let worst = errors.iter().copied().fold((0.0, [0; 3]), |a, b| if b.0 > a.0 { b } else { a });
-        let mean = errors.iter().map(|e| e.0).sum::<f64>() / errors.len() as f64;
-        println!("{name}: {} points, mean error {mean:.4}, worst {:.4} at {:?}", errors.len(), worst.0, worst.1);
-        assert!(mean < 0.006 && worst.0 < 0.12, "{name}: mean {mean}, worst {worst:?}");
+        check_signs(name, &mesh, 5);
+    }
+}
+
+/// Winding numbers nearer to one half may come out on either side: errors of many chains add up.
+const SURE: f64 = 2e-3;
+
+/// Compares all lattice points with the triangles' solid angles, but for those where these are nearly one half.
+fn check_signs(name: &str, mesh: &Mesh, depth: u32) {
+    let (winding, frame) = solve(mesh, depth);
+    let reversed = patches_of(mesh, &frame).reversed();
+    let triangles: Vec<[DVec3; 3]> = triangles(mesh).iter().map(|t| t.map(|p| snapped(&frame, p))).collect();
+    let side = 1u32 << depth;
+    let wrong: Vec<([u32; 3], f64)> = (0..side.pow(3))
+        .into_par_iter()
+        .filter_map(|i| {
+            let at = [i / side / side, i / side % side, i % side];
+            // On a face and on its rim it may be this or that: the values round the point differ.
+            let near = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+            let sign = if reversed { -1.0 } else { 1.0 };
+            let p = DVec3::from(at.map(f64::from));
+            let values = near.map(|step| sign * oracle(&triangles, p + 1e-5 * DVec3::from(step)));
+            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), &w| (low.min(w), high.max(w)));
+            let expected = low > 0.5 && !at.contains(&0);
+            let is_sure = high - low < 1e-3 && (low - 0.5).abs() > SURE;
+            (is_sure && winding.octree.is_inside(at) != expected).then_some((at, low))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{name}: {} points, such as {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
+}
+
+/// Where the scan sees a point, in cells.
+fn snapped(frame: &Frame, p: DVec3) -> DVec3 {
+    let fine = frame.snap(p).expect("in the root");
+    DVec3::from(fine.map(f64::from)) / f64::from(1u32 << frame.cell_shift())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn signs_of_soups_are_those_of_the_solid_angles(corners in prop::collection::vec(prop::array::uniform3(0.0..1.0), 3..90), snap in any::<bool>()) {
+        // On the lattice itself ties are everywhere.
+        let snap = |p: [f64; 3]| if snap { p.map(|c| (c * 8.0).round() / 8.0) } else { p };
+        let corners: Vec<[f64; 3]> = corners[..corners.len() / 3 * 3].iter().map(|&p| snap(p)).collect();
+        check_signs("soup", &soup(&corners), 4);
     }
 }
 
@@ -253,7 +285,6 @@ fn a_sieve_keeps_its_volume() {
 
 /// The lower half of a cube's surface and four times the like: nothing leaves the grid, and a wall inside vanishes.
 #[test]
-#[ignore = "known defect: crossings stay at a small open wall inside of a solid"]
 fn walls_inside_vanish() {
     let mut mesh = sample::build("cube", 4).expect("a sample");
     let first = mesh.points.len() as u32;
@@ -276,7 +307,6 @@ fn walls_inside_vanish() {
 
 /// A sheet alone encloses nothing, whatever its size; nor does it come to anything beside a solid.
 #[test]
-#[ignore = "known defect: specks stay along the rims of slanted sheets"]
 fn flat_sheets_vanish() {
     let plate = sample::build("plate", 1).expect("a sample");
     let slanted = glam::DMat3::from_rotation_x(0.3) * glam::DMat3::from_rotation_y(0.4);
