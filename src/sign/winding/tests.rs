@@ -1,7 +1,9 @@
 //! Oracles: solid angles of the triangles, unions of solids, jumps added up face by face.
 
+use super::span::solid_angle;
 use super::*;
 use crate::geom::Frame;
+use crate::geom::raster::FineTriangle;
 use crate::grid::{Axis, Key};
 use crate::mesh::{Mesh, TriangleSource, sample};
 use crate::octree::crossings::{finest_element, lattice_point};
@@ -32,17 +34,6 @@ fn solve(mesh: &Mesh, depth: u32) -> (Winding, Frame) {
     let winding = winding_signs(&hits, &patches, &Silent).expect("not cancelled");
     assert_eq!(winding.octree.validate(), Ok(()));
     (winding, frame)
-}
-
-/// Winding number of triangles: solid angles after van Oosterom and Strackee 1983.
-fn oracle(triangles: &[[DVec3; 3]], p: DVec3) -> f64 {
-    let angle = |t: &[DVec3; 3]| {
-        let [a, b, c] = t.map(|q| q - p);
-        let [la, lb, lc] = [a, b, c].map(DVec3::length);
-        let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * a.dot(b.cross(c)).atan2(below)
-    };
-    triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
 fn triangles(mesh: &Mesh) -> Vec<[DVec3; 3]> {
@@ -219,31 +210,22 @@ const SURE: f64 = 2e-3;
 /// Compares all lattice points with the triangles' solid angles, but for those where these are nearly one half.
 fn check_signs(name: &str, mesh: &Mesh, depth: u32) {
     let (winding, frame) = solve(mesh, depth);
-    let reversed = patches_of(mesh, &frame).reversed();
-    let triangles: Vec<[DVec3; 3]> = triangles(mesh).iter().map(|t| t.map(|p| snapped(&frame, p))).collect();
+    let sign = if patches_of(mesh, &frame).reversed() { -1.0 } else { 1.0 };
+    // Where the scan sees them: on a face itself, points are on the side to which they are moved.
+    let snapped = |p| frame.snap(p).expect("in the root");
+    let triangles: Vec<FineTriangle> = triangles(mesh).iter().map(|t| t.map(snapped)).collect();
     let side = 1u32 << depth;
     let wrong: Vec<([u32; 3], f64)> = (0..side.pow(3))
         .into_par_iter()
         .filter_map(|i| {
             let at = [i / side / side, i / side % side, i % side];
-            // On a face and on its rim it may be this or that: the values round the point differ.
-            let near = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
-            let sign = if reversed { -1.0 } else { 1.0 };
-            let p = DVec3::from(at.map(f64::from));
-            let values = near.map(|step| sign * oracle(&triangles, p + 1e-5 * DVec3::from(step)));
-            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), &w| (low.min(w), high.max(w)));
-            let expected = low > 0.5 && !at.contains(&0);
-            let is_sure = high - low < 1e-3 && (low - 0.5).abs() > SURE;
-            (is_sure && winding.octree.is_inside(at) != expected).then_some((at, low))
+            let fine = at.map(|c| (c << frame.cell_shift()) as i32);
+            let w = sign * triangles.iter().map(|t| solid_angle(t, fine)).sum::<f64>() / (4.0 * std::f64::consts::PI);
+            let expected = w > 0.5 && !at.contains(&0);
+            (winding.octree.is_inside(at) != expected && (w - 0.5).abs() > SURE).then_some((at, w))
         })
         .collect();
     assert!(wrong.is_empty(), "{name}: {} points, such as {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
-}
-
-/// Where the scan sees a point, in cells.
-fn snapped(frame: &Frame, p: DVec3) -> DVec3 {
-    let fine = frame.snap(p).expect("in the root");
-    DVec3::from(fine.map(f64::from)) / f64::from(1u32 << frame.cell_shift())
 }
 
 proptest! {
