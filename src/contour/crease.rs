@@ -30,7 +30,8 @@
 //! # When
 //!
 //! - The sheet is creased, and **all its tangent planes go through the point** ([`SHARP`]): a bent sheet has no such point, and its vertex stays
-//!   in its cell, as ever.
+//!   in its cell, as ever. Only if the cell that has the point has no vertex of its own, the sheet bulges into it, and may go there in any
+//!   case.
 //! - The point is at most a cell away from the cell, and in the grid.
 //!
 //! Vertices that leave are drawn to their mass points a little ([`APART`]), for up to four cells may look for the same point.
@@ -64,42 +65,61 @@ const CREASED: f32 = 0.933;
 
 /// The tangent planes go through one point if the mean square of its distances from them is less, in squared cells. Codes of normals
 /// make it wrong by a hundredth of a cell for each cell of distance.
-const SHARP: f32 = 0.05 * 0.05;
+const SHARP: f32 = 0.025 * 0.025;
+
+/// What is at a point outside of a cell, as far as vertices that would go there are concerned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// None may go there: it lies outside of the grid, or vertices stay in their cells.
+    Barred,
+    /// A cell without a vertex.
+    Empty,
+    /// A cell that has one.
+    Taken,
+}
 
 /// Whether a sheet has a crease or corner.
 pub(super) fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {
     placement.needs_normals() && sum.flatness() < CREASED
 }
 
-/// Where the vertex of a sheet goes whose planes add up to `sum`, in a cell with the least corner `corner`. It leaves the cell only for
-/// points of which `may_go` says so.
+/// Where the vertex of a sheet goes whose planes add up to `sum`, in a cell with the least corner `corner`; `beyond` tells what is at a
+/// point outside of it.
 #[inline]
-pub(super) fn solve(corner: Vec3A, placement: Placement<'_>, sum: &Qef, may_go: &dyn Fn(Vec3A) -> bool) -> Vec3A {
+pub(super) fn solve(corner: Vec3A, placement: Placement<'_>, sum: &Qef, beyond: &dyn Fn(Vec3A) -> Beyond) -> Vec3A {
     let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
     if !placement.needs_normals() || sum.flatness() >= FLAT {
         return sum.mass_point().clamp(low, high);
     }
     let free = sum.minimiser();
-    if free.cmpge(low).all() && free.cmple(high).all() { free } else { solve_outside(low, high, sum, free, may_go) }
+    if free.cmpge(low).all() && free.cmple(high).all() { free } else { solve_outside(low, high, sum, free, beyond) }
 }
 
 /// The same where the minimiser lies outside of the cell.
 #[cold]
-fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, may_go: &dyn Fn(Vec3A) -> bool) -> Vec3A {
-    if sum.flatness() < CREASED && is_common(low, high, sum, free) && may_go(free) {
-        return free.lerp(sum.mass_point(), APART);
+fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, beyond: &dyn Fn(Vec3A) -> Beyond) -> Vec3A {
+    if sum.flatness() < CREASED && is_near(low, high, free) {
+        let goes = match beyond(free) {
+            Beyond::Barred => false,
+            Beyond::Empty => true,
+            Beyond::Taken => sum.mean_square(free) < SHARP,
+        };
+        if goes {
+            return free.lerp(sum.mass_point(), APART);
+        }
     }
     sum.minimiser_within(low, high)
 }
 
 /// The point where all planes of a cell meet that are added up in `whole`, if it is a crease or corner, and near enough. `corner` and
-/// `may_go` are as for [`solve`].
-pub(super) fn common_point(corner: Vec3A, whole: &Qef, may_go: &dyn Fn(Vec3A) -> bool) -> Option<Vec3A> {
+/// `beyond` are as for [`solve`].
+pub(super) fn common_point(corner: Vec3A, whole: &Qef, beyond: &dyn Fn(Vec3A) -> Beyond) -> Option<Vec3A> {
     let free = whole.minimiser();
-    (whole.flatness() < CREASED && is_common(corner, corner + 1.0, whole, free) && may_go(free)).then_some(free)
+    let is_sharp = whole.flatness() < CREASED && whole.mean_square(free) < SHARP;
+    (is_sharp && is_near(corner, corner + 1.0, free) && beyond(free) != Beyond::Barred).then_some(free)
 }
 
-/// Whether `free` lies on all planes, and at most a cell away from the box.
-fn is_common(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A) -> bool {
-    free.cmpge(low - 1.0).all() && free.cmple(high + 1.0).all() && sum.mean_square(free) < SHARP
+/// Whether a point is at most a cell away from the box along each axis.
+fn is_near(low: Vec3A, high: Vec3A, p: Vec3A) -> bool {
+    p.cmpge(low - 1.0).all() && p.cmple(high + 1.0).all()
 }

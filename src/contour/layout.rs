@@ -94,6 +94,13 @@ impl<'a> Layout<'a> {
         self.bricks[brick].mixed
     }
 
+    /// Whether the cell at `at` is mixed. Cost: a hash probe.
+    pub(super) fn is_mixed(&self, at: [u32; 3]) -> bool {
+        let crossings = self.octree.crossings();
+        let brick = Key::cell(crossings.depth() - 3, at.map(|c| c >> 3)).and_then(|key| crossings.find(key));
+        brick.is_some_and(|brick| self.bricks[brick].mixed.get(Local::new(at[0], at[1], at[2])))
+    }
+
     /// Vertices beyond the first.
     fn extra_vertices(&self, knot: Knot) -> i32 {
         match self.style {

@@ -1,6 +1,6 @@
 //! Where the vertices of dual surfaces go.
 
-use super::crease::{APART, common_point, is_creased, solve};
+use super::crease::{APART, Beyond, common_point, is_creased, solve};
 use super::dual::Placement;
 use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
@@ -59,18 +59,28 @@ impl Planes {
         let mixed = layout.mixed(brick);
         let origin = layout.octree.crossings().origin(cells.brick());
         let side = 1 << layout.octree.crossings().depth();
-        let may_go = |p: Vec3A| {
+        let beyond = |p: Vec3A| {
             let at = p.floor().to_array().map(|c| c as i32);
-            layout.style == Style::Usual && (0..3).all(|a| origin[a].wrapping_add_signed(at[a]) < side)
+            let at: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
+            match layout.style {
+                Style::Usual if at.iter().all(|&c| c < side) => {
+                    if layout.is_mixed(at) {
+                        Beyond::Taken
+                    } else {
+                        Beyond::Empty
+                    }
+                }
+                _ => Beyond::Barred,
+            }
         };
         let mut creased = Plane::EMPTY;
         let mut knots = layout.knots_of(brick).iter().peekable();
         mixed.iter().for_each(|cell| {
             let place = |p| place(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
-                None => self.place_ordinary(cell, placement, given(cell), &may_go, place),
+                None => self.place_ordinary(cell, placement, given(cell), &beyond, place),
                 Some(_) if layout.style == Style::Disjoint => self.skip_knot(cell),
-                Some(&knot) => self.place_knot(knot, placement, given(cell), &may_go, place),
+                Some(&knot) => self.place_knot(knot, placement, given(cell), &beyond, place),
             };
             if is_creased {
                 creased.set(cell);
@@ -94,7 +104,7 @@ impl Planes {
         cells
             .mixed()
             .iter()
-            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place));
+            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| Beyond::Barred, &mut place));
     }
 
     fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
@@ -122,15 +132,15 @@ impl Planes {
         std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
     }
 
-    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `may_go` tells of a point outside
-    /// of the cell whether the vertex may go there. Returns whether the cell has a crease or corner.
+    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `beyond` tells what is at a
+    /// point outside of the cell. Returns whether the cell has a crease or corner.
     #[inline]
     fn place_ordinary(
         &mut self,
         cell: Local,
         placement: Placement<'_>,
         given: Option<Vec3A>,
-        may_go: &dyn Fn(Vec3A) -> bool,
+        beyond: &dyn Fn(Vec3A) -> Beyond,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
         if placement == Placement::Centre {
@@ -138,7 +148,7 @@ impl Planes {
             return false;
         }
         let sum = self.take_sum(cell);
-        place(given.unwrap_or_else(|| solve(least_corner(cell), placement, &sum, may_go)));
+        place(given.unwrap_or_else(|| solve(least_corner(cell), placement, &sum, beyond)));
         is_creased(placement, &sum)
     }
 
@@ -154,7 +164,7 @@ impl Planes {
         Knot { cell, mask }: Knot,
         placement: Placement<'_>,
         given: Option<Vec3A>,
-        may_go: &dyn Fn(Vec3A) -> bool,
+        beyond: &dyn Fn(Vec3A) -> Beyond,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
         let whole = self.take_sum(cell);
@@ -168,11 +178,8 @@ impl Planes {
             return false;
         }
         let tangent = self.tangents.at(cell);
-        let tip = if given.is_none() && placement.needs_normals() {
-            common_point(least_corner(cell), &whole, may_go)
-        } else {
-            None
-        };
+        let is_free = given.is_none() && placement.needs_normals();
+        let tip = if is_free { common_point(least_corner(cell), &whole, beyond) } else { None };
         let mut creased = false;
         for sheet in 0..case.sheets.count {
             let of_sheet = || {
@@ -184,7 +191,7 @@ impl Planes {
             let is_creased = is_creased(placement, &sum);
             creased |= is_creased;
             let tip = tip.filter(|_| is_creased);
-            let stay = || solve(least_corner(cell), placement, &sum, &|_| false);
+            let stay = || solve(least_corner(cell), placement, &sum, &|_| Beyond::Barred);
             let common = given.or(tip).unwrap_or_else(stay);
             if case.sheets.is_regular(sheet) {
                 let apart = if case.sheets.count > 1 || tip.is_some() { APART } else { 0.0 };
@@ -196,12 +203,9 @@ impl Planes {
                 let around = of_sheet().filter(|&e| inside_end(mask, e) == corner).map(|e| tangent(e).0);
                 let (n, sum) = around.fold((0.0, Vec3A::ZERO), |(n, sum), p| (n + 1.0, sum + p));
                 let between = least_corner(cell) + 0.25 + 0.5 * corner_of(corner);
-                if tip.is_some() {
-                    place(common.lerp(if n > 0.0 { sum / n } else { between }, APART));
-                    continue;
-                }
                 // A corner that has no crossings is no place of the surface: its vertex only has to differ from the others.
-                place(if n > 0.0 { (sum / n).lerp(common, 0.25) } else { common.lerp(between, 0.25) });
+                let (own, apart) = if n > 0.0 { (sum / n, 0.75) } else { (between, 0.25) };
+                place(common.lerp(own, if tip.is_some() { APART } else { apart }));
             }
         }
         creased
