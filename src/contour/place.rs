@@ -1,4 +1,4 @@
-//! Where the vertices of dual surfaces go.
+//! Where the vertices of dual surfaces go: the planes of their cells, added up; [`crease`](super::crease) finds the point.
 
 use super::crease::{APART, Beyond, common_point, is_creased, solve};
 use super::dual::Placement;
