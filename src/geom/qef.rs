@@ -138,6 +138,15 @@ mod tests {
         assert!((q.flatness() - 1.0 / 3.0).abs() < 1e-6);
     }
 
+    /// Planes at distances 3, 0 and 4 from a point, far from the origin as in the last cells of a brick.
+    #[test]
+    fn squared_distances_are_averaged() {
+        let q =
+            qef(&[([5.0, 8.0, 1.0], [1., 0., 0.]), ([1.0, 7.5, 3.0], [0., 1., 0.]), ([8.0, 1.0, 2.0], [0., 0., -1.])]);
+        assert!((q.mean_square(Vec3A::new(8.0, 7.5, 6.0)) - 25.0 / 3.0).abs() < 1e-4);
+        assert!(q.mean_square(Vec3A::new(5.0, 7.5, 2.0)).abs() < 2e-5);
+    }
+
     #[test]
     fn on_a_crease_the_mass_point_decides() {
         let q = qef(&[
