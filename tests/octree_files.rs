@@ -293,10 +293,10 @@ fn points_give_back_the_surface() {
 }
 
 /// What the file of a solid gives as dual surface is what the solid itself gives, rounded to 32 bits, but for the few cells with several
-/// sheets: the file has one point for all of them.
+/// sheets, as the file has one point for all of them, and for creases that bulge into the next cell: points of files stay in their cells.
 #[test]
 fn dual_surfaces_come_back() {
-    for (name, surface) in [("gear", Surface::DualContouring), ("knot-holes", Surface::Quads)] {
+    for (name, surface, most) in [("gear", Surface::DualContouring, 0.02), ("knot-holes", Surface::Quads, 0.005)] {
         let options = Options { depth: 6, surface, faces: Faces::Polygons, ..Options::default() };
         let mut mesh = sample::build(name, 1).expect("a sample");
         let with_normals = Options { surface: Surface::DualContouring, ..options };
@@ -316,7 +316,8 @@ fn dual_surfaces_come_back() {
         assert_eq!((direct.points.len(), direct.faces.len()), (again.points.len(), again.faces.len()));
         let cell = solid.frame.cell_size();
         let differ = direct.points.iter().zip(&again.points).filter(|(a, b)| a.distance(**b) > 1e-4 * cell).count();
-        assert!(differ * 200 < direct.points.len(), "{name}: {differ} of {} points differ", direct.points.len());
+        let part = differ as f64 / direct.points.len() as f64;
+        assert!(part < most, "{name}: {differ} of {} points differ", direct.points.len());
         assert!(extracted(&read, Surface::MarchingCubes).report().volume > 0.0);
         let options = Options { no_self_intersections: true, ..options };
         let mut disjoint = Mesh::default();

@@ -30,7 +30,8 @@ use std::ops::Range;
 /// Where the vertices go.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Placement<'a> {
-    /// At the minimum of the quadratic error function, kept inside the cell: sharp edges and corners are kept. Needs normals.
+    /// At the minimum of the quadratic error function, so that sharp edges and corners are kept. It lies inside the cell, but for creases and
+    /// corners that bulge into the next one: there all tangent planes meet. Needs normals.
     #[default]
     SharpFeatures,
     /// At the mean of the crossings of the sheet.
@@ -62,7 +63,8 @@ pub enum Intersections {
     /// They may: here and there they do, mostly at creases and in walls thinner than a cell.
     #[default]
     Allow,
-    /// They do not. Quadrilaterals that could are cut in four, and the few cells with several sheets are cut as by marching cubes.
+    /// They do not. Quadrilaterals that could are cut in four, the few cells with several sheets are cut as by marching cubes, and all
+    /// vertices stay in their cells, so that askew creases have notches.
     Avoid,
 }
 

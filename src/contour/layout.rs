@@ -16,7 +16,7 @@ use rayon::prelude::*;
 /// What is done about vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
-    /// Knots have the vertices of their case. Vertices may leave their cell for one that has none.
+    /// Knots have the vertices of their case. Vertices of creases may leave their cell.
     Usual,
     /// Knots have no vertex: something else stands for the surface in them. Vertices stay in their cells.
     Disjoint,

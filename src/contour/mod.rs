@@ -4,6 +4,7 @@
 //! [`grid::cases`](crate::grid::cases), so they agree on the topology. They pass the mesh on as it is made: first the points of all
 //! bricks, then the faces, in the order of the bricks; the mesh as a whole is never held.
 
+mod crease;
 mod cubes;
 mod disjoint;
 mod dual;

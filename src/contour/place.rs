@@ -1,5 +1,6 @@
-//! Where the vertices of dual surfaces go.
+//! Where the vertices of dual surfaces go: the planes of their cells, added up; [`crease`](super::crease) finds the point.
 
+use super::crease::{APART, Beyond, common_point, is_creased, solve};
 use super::dual::Placement;
 use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
@@ -11,20 +12,6 @@ use crate::octree::SignedOctree;
 use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::{Crossings, position};
 use glam::{DVec3, Vec3A};
-
-/// Vertices keep this distance from the sides of their cell, in cells.
-const CELL_MARGIN: f32 = 1.0 / 1024.0;
-/// How far each of several vertices of a cell is drawn to its own mass point. Two sheets can have one minimiser, as both sides of
-/// a thin edge do, and files that tell vertices apart by position only, as STL does, would join them: the trailing edge
-/// of a wing came back with 33 non-manifold edges.
-const APART: f32 = 1.0 / 64.0;
-
-/// From this squared length of the mean normal on, the normals of a sheet differ by no more than their codes do (0.6 degrees): its
-/// tangent planes are one plane, and the mass point lies on it.
-const FLAT: f32 = 0.9999;
-
-/// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
-const CREASED: f32 = 0.933;
 
 /// The tangent planes at the crossings round the cells of a brick, in cells from its least corner, and what they add up to for
 /// each cell.
@@ -72,17 +59,28 @@ impl Planes {
         let mixed = layout.mixed(brick);
         let origin = layout.octree.crossings().origin(cells.brick());
         let side = 1 << layout.octree.crossings().depth();
-        let is_empty = |at: [i32; 3]| {
-            let global: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
-            layout.style == Style::Usual && global.iter().all(|&c| c < side) && !layout.is_mixed(global)
+        let beyond = |p: Vec3A| {
+            let at = p.floor().to_array().map(|c| c as i32);
+            let at: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
+            match layout.style {
+                Style::Usual if at.iter().all(|&c| c < side) => {
+                    if layout.is_mixed(at) {
+                        Beyond::Taken
+                    } else {
+                        Beyond::Empty
+                    }
+                }
+                _ => Beyond::Barred,
+            }
         };
         let mut creased = Plane::EMPTY;
         let mut knots = layout.knots_of(brick).iter().peekable();
         mixed.iter().for_each(|cell| {
             let place = |p| place(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
-                None => self.place_ordinary(cell, placement, given(cell), &is_empty, place),
-                Some(&knot) => self.place_knot(knot, placement, given(cell), layout.style, place),
+                None => self.place_ordinary(cell, placement, given(cell), &beyond, place),
+                Some(_) if layout.style == Style::Disjoint => self.skip_knot(cell),
+                Some(&knot) => self.place_knot(knot, placement, given(cell), &beyond, place),
             };
             if is_creased {
                 creased.set(cell);
@@ -106,7 +104,7 @@ impl Planes {
         cells
             .mixed()
             .iter()
-            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| false, &mut place));
+            .for_each(|cell| _ = self.place_ordinary(cell, placement, given(cell), &|_| Beyond::Barred, &mut place));
     }
 
     fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
@@ -134,15 +132,15 @@ impl Planes {
         std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
     }
 
-    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `is_empty` tells of a cell near
-    /// the brick whether it is in the grid and not mixed. Returns whether the cell has a crease or corner.
+    /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `beyond` tells what is at a
+    /// point outside of the cell. Returns whether the cell has a crease or corner.
     #[inline]
     fn place_ordinary(
         &mut self,
         cell: Local,
         placement: Placement<'_>,
         given: Option<Vec3A>,
-        is_empty: &dyn Fn([i32; 3]) -> bool,
+        beyond: &dyn Fn(Vec3A) -> Beyond,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
         if placement == Placement::Centre {
@@ -150,8 +148,14 @@ impl Planes {
             return false;
         }
         let sum = self.take_sum(cell);
-        place(given.unwrap_or_else(|| solve(cell, placement, &sum, is_empty)));
+        place(given.unwrap_or_else(|| solve(least_corner(cell), placement, &sum, beyond)));
         is_creased(placement, &sum)
+    }
+
+    /// Leaves out a cell with several sheets. Returns that it has no crease.
+    fn skip_knot(&mut self, cell: Local) -> bool {
+        self.take_sum(cell);
+        false
     }
 
     /// The same for a cell with several sheets or vertices.
@@ -160,13 +164,10 @@ impl Planes {
         Knot { cell, mask }: Knot,
         placement: Placement<'_>,
         given: Option<Vec3A>,
-        style: Style,
+        beyond: &dyn Fn(Vec3A) -> Beyond,
         mut place: impl FnMut(Vec3A),
     ) -> bool {
-        self.take_sum(cell);
-        if style == Style::Disjoint {
-            return false;
-        }
+        let whole = self.take_sum(cell);
         let case = &CASES[usize::from(mask)];
         if placement == Placement::Centre {
             for vertex in 0..case.sheets.vertices {
@@ -177,6 +178,8 @@ impl Planes {
             return false;
         }
         let tangent = self.tangents.at(cell);
+        let is_free = given.is_none() && placement.needs_normals();
+        let tip = if is_free { common_point(least_corner(cell), &whole, beyond) } else { None };
         let mut creased = false;
         for sheet in 0..case.sheets.count {
             let of_sheet = || {
@@ -185,10 +188,13 @@ impl Planes {
             };
             let mut sum = Qef::EMPTY;
             of_sheet().map(&tangent).for_each(|(p, n)| sum += &Qef::of_plane(p, n));
-            let common = given.unwrap_or_else(|| solve(cell, placement, &sum, &|_| false));
-            creased |= is_creased(placement, &sum);
+            let is_creased = is_creased(placement, &sum);
+            creased |= is_creased;
+            let tip = tip.filter(|_| is_creased);
+            let stay = || solve(least_corner(cell), placement, &sum, &|_| Beyond::Barred);
+            let common = given.or(tip).unwrap_or_else(stay);
             if case.sheets.is_regular(sheet) {
-                let apart = if case.sheets.count > 1 { APART } else { 0.0 };
+                let apart = if case.sheets.count > 1 || tip.is_some() { APART } else { 0.0 };
                 place(common.lerp(sum.mass_point(), apart));
                 continue;
             }
@@ -198,7 +204,8 @@ impl Planes {
                 let (n, sum) = around.fold((0.0, Vec3A::ZERO), |(n, sum), p| (n + 1.0, sum + p));
                 let between = least_corner(cell) + 0.25 + 0.5 * corner_of(corner);
                 // A corner that has no crossings is no place of the surface: its vertex only has to differ from the others.
-                place(if n > 0.0 { (sum / n).lerp(common, 0.25) } else { common.lerp(between, 0.25) });
+                let (own, apart) = if n > 0.0 { (sum / n, 0.75) } else { (between, 0.25) };
+                place(common.lerp(own, if tip.is_some() { APART } else { apart }));
             }
         }
         creased
@@ -228,33 +235,4 @@ fn corner_of(corner: Corner) -> Vec3A {
 
 fn least_corner(cell: Local) -> Vec3A {
     Vec3A::from(cell.coords().map(|c| c as f32))
-}
-
-/// Where the vertex of a sheet in a cell goes.
-#[inline]
-fn solve(cell: Local, placement: Placement<'_>, sum: &Qef, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
-    let corner = least_corner(cell);
-    let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
-    if !placement.needs_normals() || sum.flatness() >= FLAT {
-        return sum.mass_point().clamp(low, high);
-    }
-    let free = sum.minimiser();
-    if free.cmpge(low).all() && free.cmple(high).all() { free } else { solve_outside(low, high, sum, free, is_empty) }
-}
-
-/// The same where the minimiser lies outside of the cell. A crease may bulge through an edge of the grid and back, or a corner through a
-/// face: the crossings cancel, so the cell beyond has no vertex, and the true one belongs there. Such a vertex is drawn to its mass point
-/// a little, for up to four cells may have the same minimiser.
-#[cold]
-fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, is_empty: &dyn Fn([i32; 3]) -> bool) -> Vec3A {
-    let beyond = free.floor();
-    let is_near = free.cmpge(low - 1.0).all() && free.cmple(high + 1.0).all();
-    if is_near && is_creased(Placement::SharpFeatures, sum) && is_empty(beyond.to_array().map(|c| c as i32)) {
-        return free.clamp(beyond + CELL_MARGIN, beyond + (1.0 - CELL_MARGIN)).lerp(sum.mass_point(), APART);
-    }
-    sum.minimiser_within(low, high)
-}
-
-fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {
-    placement.needs_normals() && sum.flatness() < CREASED
 }

@@ -19,7 +19,7 @@ const PENALTY: f32 = 1e-3;
 pub struct Qef {
     /// Rows of the sum of n n^T, and n.
     rows: [Vec4; 3],
-    /// Sum of n (n . p); the last is not used.
+    /// Sum of n (n . p), and of (n . p)^2.
     moments: Vec4,
     /// Sum of p, and the number of planes.
     points: Vec4,
@@ -33,9 +33,10 @@ impl Qef {
     #[inline]
     pub fn of_plane(p: Vec3A, n: Vec3A) -> Qef {
         let normal = Vec4::from((n, 1.0));
+        let distance = n.dot(p);
         Qef {
             rows: [normal * n.x, normal * n.y, normal * n.z],
-            moments: normal * n.dot(p),
+            moments: normal.with_w(distance) * distance,
             points: Vec4::from((p, 1.0)),
         }
     }
@@ -51,6 +52,13 @@ impl Qef {
     pub fn flatness(&self) -> f32 {
         let [x, y, z] = self.rows.map(|row| row.w);
         (x * x + y * y + z * z) / (self.points.w * self.points.w)
+    }
+
+    /// Mean of the squared distances of a point from the planes. There must be at least one. Rounding: 1e-5 for coordinates up to 8.
+    pub fn mean_square(&self, p: Vec3A) -> f32 {
+        let [x, y, z] = self.rows.map(Vec3A::from_vec4);
+        let twice = x * p.x + y * p.y + z * p.z - 2.0 * Vec3A::from_vec4(self.moments);
+        (twice.dot(p) + self.moments.w) / self.points.w
     }
 
     /// The point with the least sum of squared distances to the planes, and to the mass point with a weight of one in a thousand.
@@ -128,6 +136,15 @@ mod tests {
             qef(&[([0.3, 0.5, 0.1], [1., 0., 0.]), ([0.2, 0.6, 0.9], [0., 1., 0.]), ([0.9, 0.1, 0.7], [0., 0., 1.])]);
         assert!(q.minimiser().distance(Vec3A::new(0.3, 0.6, 0.7)) < 5e-3, "{}", q.minimiser());
         assert!((q.flatness() - 1.0 / 3.0).abs() < 1e-6);
+    }
+
+    /// Planes at distances 3, 0 and 4 from a point, far from the origin as in the last cells of a brick.
+    #[test]
+    fn squared_distances_are_averaged() {
+        let q =
+            qef(&[([5.0, 8.0, 1.0], [1., 0., 0.]), ([1.0, 7.5, 3.0], [0., 1., 0.]), ([8.0, 1.0, 2.0], [0., 0., -1.])]);
+        assert!((q.mean_square(Vec3A::new(8.0, 7.5, 6.0)) - 25.0 / 3.0).abs() < 1e-4);
+        assert!(q.mean_square(Vec3A::new(5.0, 7.5, 2.0)).abs() < 2e-5);
     }
 
     #[test]

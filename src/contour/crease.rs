@@ -1,0 +1,136 @@
+//! Where the vertex of a sheet goes: onto its crease or corner, wherever that is.
+//!
+//! # Why vertices leave their cells
+//!
+//! A crease runs from a cell A into a cell B through their common face F. In F the solid is a wedge, and two lines end
+//! in its tip. Mostly they leave F through different sides: there are crossings on both, F has corners of both signs,
+//! and the surface has an edge from A's vertex to B's, both on the crease. But where both leave through *the same* side
+//! e, that is crossed twice, its ends have the same sign, and so have all corners of F:
+//!
+//! ```text
+//!     +-----------+  F, seen along the crease, and the faces below it;
+//!     |    A|B    |  the solid is what is between the lines.
+//!     |     .     |
+//!     |    / \    |  No corner of F is inside: the surface does not know that it should
+//!     +---/-e-\---+  go from A to B. It goes through the cells C and D below
+//!     |  / C|D \  |  them, from A to C to D to B.
+//!     | /       \ |
+//!     o-----------o
+//! ```
+//!
+//! While the vertices of C and D stay there, the crease is cut off by up to half the length of e: a notch. **No dual
+//! surface whose vertices stay in their cells can keep it**, for of the four cells only A and B meet the crease, and no
+//! edge leads from one to the other. On turned cubes one face in five of those that a crease goes through is cut off,
+//! and 19 of 20 points of creases that were farther than 1/20 of a cell from the surface lay there; the others lay at
+//! corners, which bulge through faces likewise, and in cells with several sheets. Diagonals that cut across, and cells
+//! that know only one of the planes, were not among the causes.
+//!
+//! But C and D know both planes, by the crossings of their other edges. So their vertices go where the planes meet,
+//! beyond e, and the way from A to C to D to B is straight. The same holds for corners, and nothing has to be known of
+//! other cells.
+//!
+//! # When
+//!
+//! - The sheet is creased, and **all its tangent planes go through the point** ([`SHARP`]): a bent sheet has no such
+//!   point, and its vertex stays in its cell, as ever. Only if the cell that has the point has no vertex of its own,
+//!   the sheet bulges into it, and may go there in any case.
+//! - The point is at most a cell away from the cell, and in the grid.
+//!
+//! Vertices that leave are drawn to their mass points a little ([`APART`]), for up to four cells may look for the same
+//! point. Along the crease they come in the order of their mass points, which may differ from that of the surface by
+//! some hundredths of a cell: there narrow triangles fold over.
+//!
+//! # Cells with several sheets
+//!
+//! If the wedge contains two opposite corners of F and its tip is beyond, the solid is in doubt: signs do not tell
+//! whether the two are one or two pieces, and the complex of inside elements says two
+//! ([`grid::cases`](crate::grid::cases)). The notch between them is real topology, but needs no width: the vertices of
+//! all sheets that are creased themselves go to the one point of all planes of the cell, if there is one.
+//!
+//! # What is left
+//!
+//! Two creases in one cell with a single sheet have one vertex between them. That takes creases nearer to each other
+//! than the diagonal of a cell; all others are kept from end to end, to 0.03 cells (tests/edges.rs).
+//!
+//! Cost: within a tenth of a percent of a repair, with creases and without; hash probes for vertices that leave,
+//! nothing for others.
+
+use super::dual::Placement;
+use crate::geom::qef::Qef;
+use glam::Vec3A;
+
+/// Vertices keep this distance from the sides of their cell, in cells.
+const CELL_MARGIN: f32 = 1.0 / 1024.0;
+
+/// How far each of several vertices of a cell, and each that leaves its cell, is drawn to its own mass point. Two sheets can have one
+/// minimiser, as both sides of a thin edge do, and files that tell vertices apart by position only, as STL does, would join them:
+/// the trailing edge of a wing came back with 33 non-manifold edges.
+pub(super) const APART: f32 = 1.0 / 64.0;
+
+/// From this squared length of the mean normal on, the normals of a sheet differ by no more than their codes do (0.6 degrees): its
+/// tangent planes are one plane, and the mass point lies on it.
+const FLAT: f32 = 0.9999;
+
+/// Below this squared length of the mean normal, a sheet is taken to have a crease: two planes at 30 degrees have cos^2(15) = 0.933.
+const CREASED: f32 = 0.933;
+
+/// The tangent planes go through one point if the mean square of its distances from them is less, in squared cells. Codes of normals
+/// make it wrong by a hundredth of a cell for each cell of distance.
+const SHARP: f32 = 0.025 * 0.025;
+
+/// What is at a point outside of a cell, as far as vertices that would go there are concerned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// None may go there: it lies outside of the grid, or vertices stay in their cells.
+    Barred,
+    /// A cell without a vertex.
+    Empty,
+    /// A cell that has one.
+    Taken,
+}
+
+/// Whether a sheet has a crease or corner.
+pub(super) fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {
+    placement.needs_normals() && sum.flatness() < CREASED
+}
+
+/// Where the vertex of a sheet goes whose planes add up to `sum`, in a cell with the least corner `corner`; `beyond` tells what is at a
+/// point outside of it.
+#[inline]
+pub(super) fn solve(corner: Vec3A, placement: Placement<'_>, sum: &Qef, beyond: &dyn Fn(Vec3A) -> Beyond) -> Vec3A {
+    let (low, high) = (corner + CELL_MARGIN, corner + (1.0 - CELL_MARGIN));
+    if !placement.needs_normals() || sum.flatness() >= FLAT {
+        return sum.mass_point().clamp(low, high);
+    }
+    let free = sum.minimiser();
+    if free.cmpge(low).all() && free.cmple(high).all() { free } else { solve_outside(low, high, sum, free, beyond) }
+}
+
+/// The same where the minimiser lies outside of the cell.
+#[cold]
+fn solve_outside(low: Vec3A, high: Vec3A, sum: &Qef, free: Vec3A, beyond: &dyn Fn(Vec3A) -> Beyond) -> Vec3A {
+    if sum.flatness() < CREASED && is_near(low, high, free) {
+        let goes = match beyond(free) {
+            Beyond::Barred => false,
+            Beyond::Empty => true,
+            Beyond::Taken => sum.mean_square(free) < SHARP,
+        };
+        if goes {
+            return free.lerp(sum.mass_point(), APART);
+        }
+    }
+    sum.minimiser_within(low, high)
+}
+
+/// The point where all planes of a cell meet that are added up in `whole`, if it is a crease or corner, and near enough. `corner` and
+/// `beyond` are as for [`solve`].
+pub(super) fn common_point(corner: Vec3A, whole: &Qef, beyond: &dyn Fn(Vec3A) -> Beyond) -> Option<Vec3A> {
+    let free = whole.minimiser();
+    let is_sharp = whole.flatness() < CREASED && whole.mean_square(free) < SHARP;
+    (is_sharp && is_near(corner, corner + 1.0, free) && beyond(free) != Beyond::Barred).then_some(free)
+}
+
+/// Whether a point is at most a cell away from the box along each axis.
+fn is_near(low: Vec3A, high: Vec3A, p: Vec3A) -> bool {
+    p.cmpge(low - 1.0).all() && p.cmple(high + 1.0).all()
+}
