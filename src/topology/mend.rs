@@ -129,7 +129,7 @@ impl Loops {
         let mut complex = Complex::new(octree, side);
         thin(&mut complex, layers(limit), progress)?;
         let skeleton = Skeleton::new(&complex);
-        let found = loops(octree, &complex, &skeleton, progress)?;
+        let found = loops(octree, &complex, &skeleton, limit, progress)?;
         Ok(Loops { complex, skeleton, found })
     }
 

@@ -59,6 +59,7 @@
 
 mod betti;
 mod complex;
+mod flow;
 mod label;
 mod mend;
 #[cfg(test)]
