@@ -166,10 +166,31 @@ impl Ground {
         steps
     }
 
+    /// The signs of the corners of a cell, as the bits of a number.
+    fn corners(&self, complex: &Complex, cell: Spot) -> usize {
+        let [x, y, z] = cell.local.coords();
+        if x < 7 && y < 7 && z < 7 {
+            let plane = &self.inside[cell.brick as usize].0;
+            let half = |x: u32| {
+                let square = plane[x as usize] >> (8 * y + z);
+                (square & 3 | square >> 6 & 12) as usize
+            };
+            return half(x) | half(x + 1) << 4;
+        }
+        let sign = |corner: Corner| {
+            self.at(complex, cell.brick, cell.local, Axis::ALL.map(|axis| i32::from(corner.is_high(axis))))
+        };
+        Corner::ALL.into_iter().map(|corner| usize::from(sign(corner)) << corner.index()).sum()
+    }
+
     /// The sign of a point, some steps of -1, 0 or 1 from the start of a brick's position.
     #[inline]
     fn at(&self, complex: &Complex, mut brick: u32, local: Local, steps: [i32; 3]) -> bool {
         let mut at = local.coords();
+        if at.iter().all(|c| (1..7).contains(c)) {
+            let index = local.index() as i32 + 64 * steps[0] + 8 * steps[1] + steps[2];
+            return self.inside[brick as usize].get(Local::from_index(index as u32));
+        }
         for (axis, step) in Axis::ALL.into_iter().zip(steps) {
             let moved = at[axis.index()] as i32 + step;
             if !(0..8).contains(&moved) {
@@ -239,21 +260,15 @@ impl Rim<'_> {
         if self.ground.cells[cell.brick as usize].get(cell.local) {
             return [0.0; 3];
         }
-        let sign = |steps| self.ground.at(complex, cell.brick, cell.local, steps);
         match complex.side() {
-            Side::Object => {
-                let bit = |corner: Corner| {
-                    usize::from(sign(Axis::ALL.map(|axis| i32::from(corner.is_high(axis))))) << corner.index()
-                };
-                self.ground.moves[Corner::ALL.into_iter().map(bit).sum::<usize>()]
-            }
+            Side::Object => self.ground.moves[self.ground.corners(complex, cell)],
             Side::Background => {
                 // Half a step along each axis on which only one side is outside; where none is, on a diagonal.
                 let mut sum = [0.0; 3];
                 for reach in 1..=3 {
                     let mut any = false;
                     for direction in Direction::ALL.iter().filter(|d| d.moves().dimension() == reach) {
-                        if !sign(direction.steps()) {
+                        if !self.ground.at(complex, cell.brick, cell.local, direction.steps()) {
                             any = true;
                             (0..3).for_each(|a| sum[a] += f64::from(direction.steps()[a]));
                         }
