@@ -236,6 +236,10 @@ impl Work<'_> {
     /// Removes all loops of one side up to a size.
     fn remove(&mut self, side: Side, size: Option<f64>) -> Result<()> {
         let Some(size) = size else { return Ok(()) };
+        // Each cut and each fill removes one.
+        if self.report.after.handles as usize == self.report.cuts.len() + self.report.fills.len() {
+            return Ok(());
+        }
         let loops = Loops::find(&self.octree, side, size, self.progress)?;
         let count = loops.found.partition_point(|found| found.section.area <= size);
         self.apply(&loops, count);

@@ -26,8 +26,8 @@
 //!
 //! # Cost
 //!
-//! Without a threshold a few ns for each element of the volume, 8 elements a cell, and 768 bytes a brick; with one, of the layer along the
-//! surface that is as deep as the threshold is wide. Sections take most of the rest.
+//! Without a threshold some 4 ns for each element of the volume, 8 elements a cell, and 768 bytes a brick; with one, of the layer along the
+//! surface that is as deep as the threshold is wide. Where handles are many, sections take as long again. (docs/benchmarks.md)
 //!
 //! ```
 //! use zmend::grid::brick::{Local, Plane};

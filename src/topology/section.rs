@@ -47,12 +47,17 @@ pub(super) struct Sections<'a> {
 }
 
 impl<'a> Sections<'a> {
-    /// `ground` is that of the complex. Sections of some times the `limit` (in squares of cells) are not followed to their end, and count as
-    /// infinitely wide.
-    pub(super) fn new(complex: &'a Complex, ground: &'a Ground, limit: f64) -> Self {
+    /// `signs` are those of the complex.
+    pub(super) fn new(complex: &'a Complex, signs: &'a Signs) -> Self {
+        Sections { rim: Rim { signs, complex }, flow: Flow::default(), limit: f64::INFINITY, most: usize::MAX }
+    }
+
+    /// Sections of some times the `limit` (in squares of cells) are not followed to their end from now on, and count as infinitely wide.
+    #[must_use]
+    pub(super) fn up_to(self, limit: f64) -> Self {
         // From infinity on, casts saturate.
         let most = (WIDEST * limit) as usize;
-        Sections { rim: Rim { ground, complex }, flow: Flow::default(), limit, most: most.saturating_add(64) }
+        Sections { limit, most: most.saturating_add(64), ..self }
     }
 
     /// The area up to which all sections are taken.
@@ -93,7 +98,7 @@ impl<'a> Sections<'a> {
     pub(super) fn guess(&self, edge: Spot) -> u32 {
         let length = |axis| {
             [false, true]
-                .map(|high| self.rim.ground.run(self.rim.complex, edge, Face::new(axis, high)))
+                .map(|high| self.rim.signs.run(self.rim.complex, edge, Face::new(axis, high)))
                 .iter()
                 .sum::<u32>()
         };
@@ -110,7 +115,7 @@ const WIDEST: f64 = 8.0;
 const FAR: u32 = 64;
 
 /// What a complex was before it was thinned, by brick, in the complex's own coordinates.
-pub(super) struct Ground {
+pub(super) struct Signs {
     /// The signs of the points of the grid.
     inside: Vec<Plane>,
     cells: Vec<Plane>,
@@ -118,9 +123,9 @@ pub(super) struct Ground {
     moves: Vec<[f64; 3]>,
 }
 
-impl Ground {
+impl Signs {
     /// Cost: a hash probe a brick, in parallel.
-    pub(super) fn new(octree: &EditedOctree, complex: &Complex) -> Ground {
+    pub(super) fn new(octree: &EditedOctree, complex: &Complex) -> Signs {
         let signed = octree.signed();
         let of = |brick: &Brick| {
             let plane = match signed.crossings().find(brick.key) {
@@ -134,7 +139,7 @@ impl Ground {
             let removed = brick.record.as_deref().map_or(Plane::EMPTY, |record| record.cells[0] | record.cells[1]);
             removed | brick.live.as_deref().map_or(Plane::EMPTY, |live| live[Extent::CELL.index()])
         };
-        Ground {
+        Signs {
             inside: complex.bricks.par_iter().map(of).collect(),
             cells: complex.bricks.par_iter().map(cells).collect(),
             moves: (0..=255).map(to_surface).collect(),
@@ -208,7 +213,7 @@ impl Ground {
 
 /// The corners of squares, at the rim moved onto the surface.
 struct Rim<'a> {
-    ground: &'a Ground,
+    signs: &'a Signs,
     complex: &'a Complex,
 }
 
@@ -220,7 +225,7 @@ impl Rim<'_> {
         let [u, v] = axis.others();
         let (index, [u_step, v_step]) = (edge.local.index(), [u, v].map(|axis| 1 << (6 - 3 * axis.index())));
         if index & 7 * u_step != 0 && index & 7 * v_step != 0 {
-            let cells = &self.ground.cells[edge.brick as usize];
+            let cells = &self.signs.cells[edge.brick as usize];
             let corners = [index, index - u_step, index - v_step, index - u_step - v_step];
             if corners.into_iter().all(|corner| cells.get(Local::from_index(corner))) {
                 return std::array::from_fn(|a| if a == axis.index() { 1.0 } else { 0.0 });
@@ -257,18 +262,18 @@ impl Rim<'_> {
     /// How far the corner in a cell of the complex's coordinates is moved.
     fn moved(&self, cell: Spot) -> [f64; 3] {
         let complex = self.complex;
-        if self.ground.cells[cell.brick as usize].get(cell.local) {
+        if self.signs.cells[cell.brick as usize].get(cell.local) {
             return [0.0; 3];
         }
         match complex.side() {
-            Side::Object => self.ground.moves[self.ground.corners(complex, cell)],
+            Side::Object => self.signs.moves[self.signs.corners(complex, cell)],
             Side::Background => {
                 // Half a step along each axis on which only one side is outside; where none is, on a diagonal.
                 let mut sum = [0.0; 3];
                 for reach in 1..=3 {
                     let mut any = false;
                     for direction in Direction::ALL.iter().filter(|d| d.moves().dimension() == reach) {
-                        if !self.ground.at(complex, cell.brick, cell.local, direction.steps()) {
+                        if !self.signs.at(complex, cell.brick, cell.local, direction.steps()) {
                             any = true;
                             (0..3).for_each(|a| sum[a] += f64::from(direction.steps()[a]));
                         }

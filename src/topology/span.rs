@@ -12,7 +12,7 @@
 //! parallel, and 0.3 us an edge of the skeleton.
 
 use super::complex::{Complex, Spot};
-use super::section::{Ground, Section, Sections};
+use super::section::{Section, Sections, Signs};
 use super::skeleton::{Arc, Skeleton};
 use crate::error::Result;
 use crate::octree::EditedOctree;
@@ -64,11 +64,11 @@ pub(super) fn loops(
     if round.is_empty() {
         return Ok(Vec::new());
     }
-    let ground = Ground::new(octree, complex);
+    let signs = Signs::new(octree, complex);
     let thinnest: Result<Vec<Candidate>> = round
         .par_iter()
         .map_init(
-            || Sections::new(complex, &ground, limit),
+            || Sections::new(complex, &signs).up_to(limit),
             |sections, arc| {
                 check(progress)?;
                 Ok(thin_place(sections, &skeleton.spots[arc.edges.clone()]))
@@ -82,7 +82,7 @@ pub(super) fn loops(
     let mut loops: Vec<Loop> = arcs
         .into_par_iter()
         .map_init(
-            || Sections::new(complex, &ground, limit),
+            || Sections::new(complex, &signs).up_to(limit),
             |sections, (arc, thin)| refined(sections, &skeleton.spots[arc.edges.clone()], thin),
         )
         .collect();
@@ -195,4 +195,36 @@ fn refined(sections: &mut Sections<'_>, edges: &[Spot], mut best: Candidate) -> 
         step /= 2;
     }
     Loop { edge: best.edge, centre: sections.centre(best.edge), section: best.section }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::topology::oracle::{noise, octree};
+    use crate::topology::{Side, thin};
+
+    #[test]
+    fn bridges_are_the_arcs_without_which_their_ends_are_apart() {
+        let mut seen = [0; 2];
+        for seed in 0..12u8 {
+            let density = 0.3 + 0.05 * f64::from(seed);
+            let signed = octree(4, |p| p.iter().all(|&c| c < 11) && noise(u64::from(seed), p) < density);
+            let octree = EditedOctree::unedited(signed);
+            for side in [Side::Object, Side::Background] {
+                let mut complex = Complex::new(&octree, side);
+                thin(&mut complex, None, &Silent).unwrap();
+                let skeleton = Skeleton::new(&complex);
+                let found = bridges(&skeleton);
+                for (i, arc) in skeleton.arcs().iter().enumerate() {
+                    let mut parent: Vec<u32> = (0..skeleton.nodes().len() as u32).collect();
+                    let others = skeleton.arcs().iter().enumerate().filter(|(other, _)| *other != i);
+                    others.for_each(|(_, other)| _ = join(&mut parent, other));
+                    assert_eq!(found[i], join(&mut parent, arc), "{seed} {side:?} {i}");
+                    seen[usize::from(found[i])] += 1;
+                }
+            }
+        }
+        assert!(seen.iter().all(|&count| count > 20), "{seen:?}");
+    }
 }
