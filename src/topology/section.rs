@@ -57,7 +57,7 @@ impl<'a> Sections<'a> {
     pub(super) fn up_to(self, limit: f64) -> Self {
         // From infinity on, casts saturate.
         let most = (WIDEST * limit) as usize;
-        Sections { limit, most: most.saturating_add(64), ..self }
+        Sections { limit, most: most.saturating_add(FOLDS), ..self }
     }
 
     /// The area up to which all sections are taken.
@@ -109,7 +109,10 @@ impl<'a> Sections<'a> {
 }
 
 /// By how much the squares of a section may outnumber its vector area. Staircases make that at most the root of 3; the rest is for folds.
-const WIDEST: f64 = 8.0;
+const WIDEST: f64 = 16.0;
+
+/// And by how much at least: noise has small sections with many folds.
+const FOLDS: usize = 256;
 
 /// The length from which on lines are all the same, in cells.
 const FAR: u32 = 64;
