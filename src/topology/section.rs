@@ -181,7 +181,7 @@ impl Signs {
             let plane = &self.inside[cell.brick as usize].0;
             let half = |x: u32| {
                 let square = plane[x as usize] >> (8 * y + z);
-                (square & 3 | square >> 6 & 12) as usize
+                ((square & 0b11) | (square >> 6 & 0b1100)) as usize
             };
             return half(x) | half(x + 1) << 4;
         }
@@ -227,7 +227,7 @@ impl Rim<'_> {
         let axis = edge.extent.axes().next().expect("an edge has an axis");
         let [u, v] = axis.others();
         let (index, [u_step, v_step]) = (edge.local.index(), [u, v].map(|axis| 1 << (6 - 3 * axis.index())));
-        if index & 7 * u_step != 0 && index & 7 * v_step != 0 {
+        if index & (7 * u_step) != 0 && index & (7 * v_step) != 0 {
             let cells = &self.signs.cells[edge.brick as usize];
             let corners = [index, index - u_step, index - v_step, index - u_step - v_step];
             if corners.into_iter().all(|corner| cells.get(Local::from_index(corner))) {

@@ -106,12 +106,17 @@ pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress)
         Step::new(complex, &marks, &mut place_of).run(complex, &mut active);
         // Faces whose turn has not come yet are waited for.
         active.extend(marks.iter().filter(|marks| marks.waiting).map(|marks| marks.brick));
-        // A stable sort merges the runs that are in order already.
-        active.sort();
-        active.dedup();
+        merge(&mut active);
         done.steps += 1;
         progress.advance(1);
     }
+}
+
+/// Sorts a list of a few runs that are in order, without duplicates.
+#[expect(clippy::stable_sort_primitive, reason = "stable sorts merge runs")]
+fn merge(list: &mut Vec<u32>) {
+    list.sort();
+    list.dedup();
 }
 
 /// The bricks in or beside which something is missing: all others have no element with exactly one coface.
@@ -241,9 +246,9 @@ impl<'a> Step<'a> {
         let mut beside = Vec::new();
         for mark in marks {
             let reaches_low =
-                |&&(extent, axis): &&(Extent, Axis)| mark.plane(extent).is_some_and(|p| p.touches_min(axis));
+                |&(extent, axis): &(Extent, Axis)| mark.plane(extent).is_some_and(|p| p.touches_min(axis));
             for axis in Axis::ALL {
-                if PAIRS.iter().filter(|(_, other)| *other == axis).any(|pair| reaches_low(&pair)) {
+                if PAIRS.iter().filter(|(_, other)| *other == axis).any(reaches_low) {
                     beside.extend(complex.open(mark.brick, Face::new(axis, false)));
                 }
             }
@@ -252,8 +257,7 @@ impl<'a> Step<'a> {
         beside.sort_unstable();
         beside.dedup();
         uppers.extend(beside);
-        uppers.sort();
-        uppers.dedup();
+        merge(&mut uppers);
         place_of.resize(complex.bricks.len(), NO_MARKS);
         for (place, mark) in (0..).zip(marks).filter(|(_, mark)| mark.kinds != 0) {
             place_of[mark.brick as usize] = place;
