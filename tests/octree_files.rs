@@ -302,9 +302,9 @@ fn dual_surfaces_come_back() {
         let with_normals = Options { surface: Surface::DualContouring, ..options };
         let (solid, _) = solidify(&mut mesh, &with_normals, &Silent).expect("repairable");
         let points = solid.cell_points(surface).expect("there are normals");
-        let bytes = written(&solid.octree, &solid.frame, Some(points.as_ref()), OctreeFormat::Sog);
+        let bytes = written(solid.signed(), &solid.frame, Some(points.as_ref()), OctreeFormat::Sog);
         let file = read_octree_bytes(name, &bytes, None).expect("ours");
-        let read = Solid { octree: file.octree, frame: file.frame, points: file.points };
+        let read = Solid::from(file);
         let extracted = |solid: &Solid, surface| {
             let mut mesh = Mesh::default();
             solid.extract(&Options { surface, ..options }, &mut mesh, &Silent).expect("memory");
@@ -327,13 +327,13 @@ fn dual_surfaces_come_back() {
 
 #[test]
 fn surfaces_that_need_normals_need_them() {
-    let solid = Solid { octree: octree(3, false, |p| p == [4, 4, 4]), frame: unit(3), points: None };
+    let solid = Solid::new(octree(3, false, |p| p == [4, 4, 4]), unit(3));
     let mut mesh = Mesh::default();
     let sharp = Options { surface: Surface::DualContouring, ..Options::default() };
     assert!(solid.extract(&sharp, &mut mesh, &Silent).expect_err("no normals").to_string().contains("take mc"));
     assert!(solid.cell_points(Surface::MarchingCubes).is_err() && solid.cell_points(Surface::Blocks).is_ok());
     let path = tempfile::tempdir().expect("a directory").path().join("x.dcf");
-    assert!(io::write_dcf(path, &solid.octree, &Silent).expect_err("no normals").to_string().contains("SOF"));
+    assert!(io::write_dcf(path, solid.signed(), &Silent).expect_err("no normals").to_string().contains("SOF"));
     for surface in [Surface::MarchingCubes, Surface::Quads, Surface::Blocks] {
         let mut mesh = Mesh::default();
         solid.extract(&Options { surface, ..sharp }, &mut mesh, &Silent).expect("memory");
