@@ -32,6 +32,8 @@ pub(super) struct Decoded {
     pub(super) bricks: Vec<Divided>,
     /// Cells of one sign, of the size of a brick or larger, and whether they are inside, in order.
     pub(super) uniform: Vec<(Key, bool)>,
+    /// In a larger cube than the file's: for each brick its place among those of the file, if it is one of them.
+    pub(super) sources: Option<Vec<Option<u32>>>,
 }
 
 /// A brick with both signs.
@@ -66,7 +68,7 @@ pub(super) fn decode<D: Dialect, R: Read>(
     let depth = header.depth.max(LEAST_DEPTH);
     let root = Key::cell(depth - header.depth, [0; 3]).expect("the least corner of the grid");
     let mut decoder = Decoder::<D> {
-        made: Decoded { depth, cells: 1 << header.depth, bricks: Vec::new(), uniform: Vec::new() },
+        made: Decoded { depth, cells: 1 << header.depth, bricks: Vec::new(), uniform: Vec::new(), sources: None },
         brick: None,
         leaves: Plane::EMPTY,
         data: Box::new([D::Leaf::default(); 512]),

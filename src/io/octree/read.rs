@@ -5,6 +5,7 @@ use super::dcf::Dcf;
 use super::decode::{Decoded, Divided, Keep, decode};
 use super::dialect::{Dialect, Header};
 use super::fill::{self, Hermites};
+use super::pad::{LEVELS, shifted};
 use super::sof::Sof;
 use super::sog::Sog;
 use super::{OctreeFile, OctreeFormat, OctreeInfo};
@@ -26,8 +27,7 @@ use std::path::Path;
 /// Memory while reading: some 8 bytes a surface cell beyond what is returned.
 ///
 /// # Errors
-/// When the file cannot be read, is of no known format or malformed, holds signs that contradict each other or a solid that touches the
-/// side of its cube; and `Cancelled`.
+/// When the file cannot be read, is of no known format or malformed, or holds signs that contradict each other; and `Cancelled`.
 pub fn read_octree(path: impl AsRef<Path>, progress: &dyn Progress) -> Result<OctreeFile> {
     let path = path.as_ref();
     let io_error = |e| Error::io(path, "read", e);
@@ -75,6 +75,7 @@ fn read_from(
         empty_cells: 0,
         missing_samples: 0,
         trailing_bytes: 0,
+        is_padded: false,
     };
     let mut reading = Reading { name, bytes, info, progress };
     let (octree, frame, points) = match format {
@@ -113,8 +114,14 @@ impl<R: Read> Reading<'_, R> {
             let points_of_brick: Vec<[f32; 3]> = leaves.iter().map(|cell| data[cell.index() as usize]).collect();
             points.push(brick.key, *leaves, &points_of_brick);
         })?;
+        if decoded.sources.is_some() {
+            points = points.renamed(shifted);
+        }
         let octree =
             self.octree(&decoded, true, |_, brick, samples| fill::from_points(&points, &frame, brick, samples))?;
+        if decoded.sources.is_some() {
+            points = fill::completed(&points, &octree, &frame);
+        }
         Ok((octree, frame, Some(points)))
     }
 
@@ -130,18 +137,29 @@ impl<R: Read> Reading<'_, R> {
         let header = D::read_header(&mut self.bytes)?;
         let frame = self.frame(header)?;
         let decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;
-        let (problem, [x, y, z], remedy) = match decoded.disagreement() {
-            None => return Ok((frame, decoded)),
-            Some(Disagreement::Around(point)) => {
-                ("cells disagree whether their common corner is inside:", point, "the file is damaged: write it again")
-            }
-            Some(Disagreement::OnSide(point)) => {
-                let remedy = "write the octree again with a margin of at least one cell on all sides";
-                ("the solid touches the side of its cube", point, remedy)
-            }
+        let Some(found) = decoded.disagreement() else { return Ok((frame, decoded)) };
+        if let Disagreement::Around(point) = found {
+            return Err(self.disagreement(point));
+        }
+        // The solid touches the side of its cube.
+        let shift = 1 << decoded.depth;
+        let Some(decoded) = decoded.padded() else {
+            let problem = "the solid touches the side of its cube, and the grid is too fine for a larger one";
+            let remedy = "write the octree again with a margin of at least one cell on all sides";
+            return Err(Error::format(self.name, Place::Whole, problem, remedy));
         };
-        let problem = format!("{problem} at lattice point {x}, {y}, {z}");
-        Err(Error::format(self.name, Place::Whole, problem, remedy))
+        if let Some(Disagreement::Around(point) | Disagreement::OnSide(point)) = decoded.disagreement() {
+            return Err(self.disagreement(point.map(|c| c.saturating_sub(shift))));
+        }
+        self.info.is_padded = true;
+        let side = frame.size() * f64::from(1 << LEVELS);
+        let frame = Frame::new(frame.origin() - frame.size(), side, decoded.depth);
+        Ok((frame.map_err(|e| Error::format(self.name, Place::Whole, format!("a larger cube: {e}"), ""))?, decoded))
+    }
+
+    fn disagreement(&self, [x, y, z]: [u32; 3]) -> Error {
+        let problem = format!("cells disagree whether their common corner is inside: at lattice point {x}, {y}, {z}");
+        Error::format(self.name, Place::Whole, problem, "the file is damaged: write it again")
     }
 
     fn frame(&self, header: Header) -> Result<Frame> {
@@ -153,7 +171,7 @@ impl<R: Read> Reading<'_, R> {
         frame.map_err(|e| Error::format(self.name, Place::Whole, format!("the cube of the octree: {e}"), ""))
     }
 
-    /// Puts the octree together; `samples` pushes those of the crossings of brick number i, in order.
+    /// Puts the octree together; `samples` pushes those of the crossings of brick number i of the file, in order.
     fn octree(
         &self,
         decoded: &Decoded,
@@ -167,7 +185,16 @@ impl<R: Read> Reading<'_, R> {
         }
         let signs: Vec<(Key, Plane)> = decoded.bricks.iter().map(|brick| (brick.key, brick.corners[0])).collect();
         let is_inside = |brick| decoded.is_uniformly_inside(brick);
-        let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| samples(i, &decoded.bricks[i], list);
+        let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| {
+            let brick = &decoded.bricks[i];
+            match &decoded.sources {
+                None => samples(i, brick, list),
+                Some(sources) => match sources[i] {
+                    Some(i) => samples(i as usize, brick, list),
+                    None => fill::at_sides(decoded.depth, brick, list),
+                },
+            }
+        };
         Ok(SignedOctree::from_signs(decoded.depth, with_normals, &signs, is_inside, samples))
     }
 }
