@@ -39,7 +39,7 @@ struct Candidate {
 impl Candidate {
     /// What the thinnest edge of an arc has least: of sections of about the same area, the straighter one changes less.
     fn cost(&self) -> f64 {
-        self.section.area + self.section.squares as f64 / 4.0
+        self.section.area + self.section.squares as f64 / 2.0
     }
 }
 
