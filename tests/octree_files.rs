@@ -238,7 +238,6 @@ fn what_makes_no_sense_is_refused() {
         read_octree_bytes("x.sof", &bytes, Some(OctreeFormat::Sof)).expect_err("no sense").to_string()
     };
     assert!(refusal(&[7]).contains("type 7"));
-    assert!(refusal(&[2, 0xf0]).contains("above the finest level"));
     assert!(refusal(&[0; 100]).contains("finest level is divided"));
     // Four cells a side are inside in one corner of the grid, in another one eight corners say so of one cell.
     let one_child = |i: usize, child: &[u8]| {
@@ -459,4 +458,47 @@ fn too_fine_to_be_put_into_a_larger_cube() {
     let bytes: Vec<u8> = (1i32 << 17).to_le_bytes().into_iter().chain([0]).chain(full(0)).collect();
     let error = read_octree_bytes("x.sof", &bytes, Some(OctreeFormat::Sof)).expect_err("contradictory").to_string();
     assert!(error.contains("disagree") || error.contains("too fine"), "{error}");
+}
+
+#[test]
+fn surface_cells_above_the_finest_level_are_divided() {
+    // A ball, of which cells of two finest ones are surface cells wherever they may be.
+    let cells = 16u32;
+    let inside = |p: [u32; 3]| p.iter().map(|&c| (f64::from(c) - 8.1).powi(2)).sum::<f64>() < 25.0;
+    fn node(at: [u32; 3], side: u32, coarse: u32, inside: &dyn Fn([u32; 3]) -> bool, out: &mut Vec<u8>) {
+        let corners = (0..8u32).map(|i| inside(std::array::from_fn(|a| at[a] + side * (i >> (2 - a) & 1))));
+        let mask = corners.enumerate().fold(0u8, |mask, (i, is_in)| mask | u8::from(!is_in) << i);
+        if side <= coarse {
+            out.extend(if [0, 255].contains(&mask) { [1, mask & 1] } else { [2, mask] });
+            return;
+        }
+        out.push(0);
+        for i in 0..8u32 {
+            // One half is fine, the other one is coarse.
+            let child: [u32; 3] = std::array::from_fn(|a| at[a] + side / 2 * (i >> (2 - a) & 1));
+            let coarse = if side == 16 && i >= 4 { 1 } else { coarse };
+            node(child, side / 2, coarse, inside, out);
+        }
+    }
+    for coarse in [1, 2, 4] {
+        let mut bytes = (cells as i32).to_le_bytes().to_vec();
+        node([0; 3], cells, coarse, &inside, &mut bytes);
+        let file = read_octree_bytes("coarse", &bytes, Some(OctreeFormat::Sof)).expect("consistent");
+        assert_eq!((file.octree.validate(), file.info.is_padded), (Ok(()), false));
+        let mut mesh = Mesh::default();
+        marching_cubes(&file.octree, &file.frame, &mut mesh, &Silent).expect("memory");
+        assert_eq!((mesh.validate(), mesh.report().genus), (Ok(()), Some(0)), "{coarse}");
+        let volume = mesh.report().volume * 4096.0 / (4.0 / 3.0 * std::f64::consts::PI * 125.0);
+        assert!((0.8..1.15).contains(&volume), "{coarse} {volume}");
+        // The fine half is as it was.
+        for i in 0..9 * 17 * 17 {
+            let p = [8 + i / 289, i / 17 % 17, i % 17];
+            let fine = p.iter().all(|&c| c < 16) && p[0] > 8;
+            assert!(!fine || file.octree.is_inside(p) == inside(p), "{coarse} {p:?}");
+        }
+    }
+    let mut bytes = (1i32 << 10).to_le_bytes().to_vec();
+    bytes.extend([2, 0xf0]);
+    let error = read_octree_bytes("x.sof", &bytes, Some(OctreeFormat::Sof)).expect_err("a billion").to_string();
+    assert!(error.contains("too many"), "{error}");
 }

@@ -34,8 +34,8 @@ pub struct TracedRound {
     pub edges: Vec<Key>,
     /// For each arc its edges, and the area (in squares of cells) and number of squares of its thinnest section.
     pub arcs: Vec<(Range<usize>, f64, u64)>,
-    /// The edges that are cut, or the faces that are filled, sorted.
-    pub removed: Vec<Key>,
+    /// The edges that are cut, or the faces that are filled, sorted, with area and squares of their sections.
+    pub removed: Vec<(Key, f64, u64)>,
 }
 
 impl Trace {
@@ -48,8 +48,9 @@ impl Trace {
     pub fn keep_loops(&mut self, octree: &EditedOctree, loops: &Loops, chosen: &[usize]) {
         let skeleton = loops.skeleton();
         let sizes = loops.arc_sizes(octree);
-        let mut removed: Vec<Key> = chosen.iter().map(|&i| loops.edge(i)).collect();
-        removed.sort_unstable();
+        let with_size = |&i: &usize| (loops.edge(i), loops.handles()[i].area, loops.handles()[i].squares);
+        let mut removed: Vec<(Key, f64, u64)> = chosen.iter().map(with_size).collect();
+        removed.sort_unstable_by_key(|cut| cut.0);
         self.rounds.push(TracedRound {
             side: loops.complex().side(),
             edges: skeleton.edges().to_vec(),
@@ -106,8 +107,10 @@ impl TracedRound {
         let of_arc = move |(edges, area, squares): &(Range<usize>, f64, u64)| {
             let (area, squares) = (*area, *squares);
             self.edges[edges.clone()].iter().map(move |&edge| {
-                let is_removed = self.removed.binary_search(&edge).is_ok();
-                (edge, area, squares, is_removed)
+                match self.removed.binary_search_by_key(&edge, |cut| cut.0) {
+                    Ok(i) => (edge, self.removed[i].1, self.removed[i].2, true),
+                    Err(_) => (edge, area, squares, false),
+                }
             })
         };
         self.arcs.iter().flat_map(of_arc)

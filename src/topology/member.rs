@@ -4,8 +4,8 @@
 //! stay as they are from the first loop that is removed to the last.
 
 use super::complex::{Complex, Spot};
-use super::section::{faces_around, partner};
-use crate::grid::Key;
+use super::section::partner;
+use crate::grid::{Face, Key};
 use crate::octree::SignedOctree;
 use crate::octree::components::Components;
 use crate::octree::crossings::lattice_point;
@@ -61,7 +61,9 @@ pub(super) fn flow(complex: &Complex, edge: Spot) -> impl Iterator<Item = Key> +
     std::iter::from_fn(move || {
         let &from = pending.get(next)?;
         next += 1;
-        let into = faces_around(complex, from).filter_map(|(_, face)| partner(complex, face));
+        let sides = Face::ALL.into_iter().filter(|side| !from.extent.contains(side.axis()));
+        let faces = sides.filter_map(|side| complex.half_toward(from, side));
+        let into = faces.filter_map(|face| partner(complex, face));
         pending.extend(into.map(|(_, edge)| edge).filter(|edge| seen.insert(edge.pack())));
         Some(complex.key(from))
     })

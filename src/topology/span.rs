@@ -124,17 +124,26 @@ fn thin_place(sections: &mut Sections<'_>, edges: &[Spot]) -> Candidate {
     best
 }
 
-/// The thinnest section near a thin one.
+/// Arcs of so many widths of their section are gone along once more.
+const LONG: usize = 8;
+
+/// The thinnest section near a thin one; along a tube, where many are about the same, anywhere.
 fn refined(sections: &mut Sections<'_>, edges: &[Spot], mut best: Candidate) -> Loop {
-    let mut step = width(best.section.area).div_ceil(4);
+    let wide = width(best.section.area);
+    let mut look = |i: usize, best: &mut Candidate| {
+        let other = take(sections, edges, i);
+        if other.cost() < best.cost() {
+            *best = other;
+        }
+    };
+    if edges.len() > LONG * wide {
+        (0..edges.len()).step_by(wide.div_ceil(2)).for_each(|i| look(i, &mut best));
+    }
+    let mut step = wide.div_ceil(4);
     while step > 0 {
         let middle = best.place;
-        for i in [middle.checked_sub(step), Some(middle + step)].into_iter().flatten().filter(|&i| i < edges.len()) {
-            let other = take(sections, edges, i);
-            if other.cost() < best.cost() {
-                best = other;
-            }
-        }
+        let both = [middle.checked_sub(step), Some(middle + step)].into_iter().flatten();
+        both.filter(|&i| i < edges.len()).for_each(|i| look(i, &mut best));
         step /= 2;
     }
     Loop { edge: best.edge, centre: sections.centre(best.edge), section: best.section }

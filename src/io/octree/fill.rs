@@ -13,7 +13,7 @@ use crate::octree::{SignedOctree, StoredPoints};
 use glam::DVec3;
 
 /// A crossing of which nothing is known.
-pub(super) const HALF_WAY: Sample = Sample { offset: 1 << 15, normal: 0 };
+const HALF_WAY: Sample = Sample { offset: 1 << 15, normal: 0 };
 
 /// The samples of DCF, brick by brick: 4 bytes a crossing and 8 a brick.
 #[derive(Default)]
@@ -111,6 +111,13 @@ fn cut(axis: Axis, [a, b, c, d]: [DVec3; 4]) -> Sample {
     };
     // Numbers below 0 become 0.
     Sample::new((at * 65536.0) as u16, normal)
+}
+
+/// Pushes the samples of a brick of which nothing is known.
+pub(super) fn half_way(brick: &Divided, samples: &mut Vec<Sample>) {
+    for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
+        samples.extend(plane.iter().map(|_| Sample { normal: straight(axis), ..HALF_WAY }));
+    }
 }
 
 /// Pushes the samples of a brick beside the file's cube, which is the middle one of 64: the solid ends where the cube does. Between

@@ -19,8 +19,8 @@
 //!
 //! Every file that is read gives an octree that all of this library can work with, or an error: nodes of unknown type, cut files, cells
 //! that disagree on a lattice point that they share are refused. A solid that touches the side of its cube ends there, in a grid four times
-//! as wide (see `pad`). Surface cells without a change of sign are taken as empty, at any level; those with one must be at the finest level. Grids of 1, 2 and 4 cells a side become
-//! the least corner of one of 8, with cells of the same size.
+//! as wide (see `pad`). Surface cells without a change of sign are taken as empty, at any level; those with one that are not at the finest
+//! level are divided (see `coarse`). Grids of 1, 2 and 4 cells a side become the least corner of one of 8, with cells of the same size.
 //!
 //! What a file does not say of a crossing is filled in. SOF says nothing: crossings lie half way, and there are no normals. From the
 //! points of SOG, each crossing lies where its edge meets the plane that fits the points of its four cells best (its normal is the
@@ -28,6 +28,7 @@
 //! crossed half way, at a right angle. Writing what was read gives the same file again, if it came from here.
 
 mod check;
+mod coarse;
 mod dcf;
 mod decode;
 mod dialect;

@@ -7,7 +7,7 @@
 //! Cost: 27 look-ups for each brick of the file's cube that has points inside on its side.
 
 use super::check::{corners_of, plane_of};
-use super::decode::{Decoded, Divided};
+use super::decode::{Decoded, Divided, Source};
 use crate::geom::frame::DEPTHS;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Corner, Direction, Key};
@@ -48,20 +48,21 @@ impl Decoded {
         beyond.bricks.sort_unstable();
         beyond.bricks.dedup();
         let own = |at: [i32; 3]| self.points(&beyond, at);
-        let mut bricks: Vec<(Divided, Option<u32>)> = Vec::with_capacity(self.bricks.len() + beyond.bricks.len());
+        let mut bricks: Vec<(Divided, Source)> = Vec::with_capacity(self.bricks.len() + beyond.bricks.len());
         for at in &beyond.bricks {
             let corners = corners_of(own(*at), |step| own(std::array::from_fn(|a| at[a] + step[a])));
             if corners != [Plane::EMPTY; 8] {
                 let key = Key::cell(depth - 3, at.map(|c| (c + side as i32) as u32)).expect("beside the middle");
-                bricks.push((Divided { key, corners }, None));
+                bricks.push((Divided { key, corners }, Source::Beside));
             }
         }
-        let of_file = (0..).zip(self.bricks);
-        bricks.extend(of_file.map(|(i, brick)| (Divided { key: shifted(brick.key), ..brick }, Some(i))));
+        let sources = self.sources.unwrap_or_else(|| (0..self.bricks.len() as u32).map(Source::File).collect());
+        let of_file = self.bricks.into_iter().zip(sources);
+        bricks.extend(of_file.map(|(brick, source)| (Divided { key: shifted(brick.key), ..brick }, source)));
         bricks.sort_unstable_by_key(|(brick, _)| brick.key);
         let (bricks, sources) = bricks.into_iter().unzip();
         let uniform = self.uniform.into_iter().map(|(cell, is_inside)| (shifted(cell), is_inside)).collect();
-        Some(Decoded { depth, cells: 1 << depth, bricks, uniform, sources: Some(sources) })
+        Some(Decoded { depth, cells: 1 << depth, bricks, uniform, coarse: Vec::new(), sources: Some(sources) })
     }
 
     /// Grids of fewer than 8 cells a side do not fill their brick: the points on their high sides are its own.

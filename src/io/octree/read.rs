@@ -2,7 +2,7 @@
 
 use super::check::Disagreement;
 use super::dcf::Dcf;
-use super::decode::{Decoded, Divided, Keep, decode};
+use super::decode::{Decoded, Divided, Keep, Source, decode};
 use super::dialect::{Dialect, Header};
 use super::fill::{self, Hermites};
 use super::pad::{LEVELS, shifted};
@@ -101,11 +101,7 @@ type Parts = (SignedOctree, Frame, Option<StoredPoints>);
 impl<R: Read> Reading<'_, R> {
     fn sof(&mut self) -> Result<Parts> {
         let (frame, decoded) = self.decoded::<Sof>(&mut |_, _, _| {})?;
-        let half_way = |_, brick: &Divided, samples: &mut Vec<Sample>| {
-            let crossings = brick.crossed().iter().map(|plane| plane.count() as usize).sum();
-            samples.resize(crossings, fill::HALF_WAY);
-        };
-        Ok((self.octree(&decoded, false, half_way)?, frame, None))
+        Ok((self.octree(&decoded, false, |_, brick, samples| fill::half_way(brick, samples))?, frame, None))
     }
 
     fn sog(&mut self) -> Result<Parts> {
@@ -114,7 +110,7 @@ impl<R: Read> Reading<'_, R> {
             let points_of_brick: Vec<[f32; 3]> = leaves.iter().map(|cell| data[cell.index() as usize]).collect();
             points.push(brick.key, *leaves, &points_of_brick);
         })?;
-        if decoded.sources.is_some() {
+        if self.info.is_padded {
             points = points.renamed(shifted);
         }
         let octree =
@@ -129,14 +125,24 @@ impl<R: Read> Reading<'_, R> {
         let mut hermites = Hermites::default();
         let (frame, decoded) = self.decoded::<Dcf>(&mut |brick, leaves, data| hermites.push(brick, leaves, data))?;
         self.info.missing_samples = hermites.missing;
-        Ok((self.octree(&decoded, true, |i, _, samples| hermites.of_brick(i, samples))?, frame, None))
+        Ok((
+            self.octree(&decoded, true, |i, brick, samples| match i {
+                Some(i) => hermites.of_brick(i, samples),
+                None => fill::half_way(brick, samples),
+            })?,
+            frame,
+            None,
+        ))
     }
 
     /// Reads header and nodes, and makes sure that the signs make sense.
     fn decoded<D: Dialect>(&mut self, keep: &mut Keep<'_, D::Leaf>) -> Result<(Frame, Decoded)> {
         let header = D::read_header(&mut self.bytes)?;
         let frame = self.frame(header)?;
-        let decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;
+        let mut decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;
+        if let Some(point) = decoded.divide() {
+            return Err(self.disagreement(point));
+        }
         let Some(found) = decoded.disagreement() else { return Ok((frame, decoded)) };
         if let Disagreement::Around(point) = found {
             return Err(self.disagreement(point));
@@ -171,12 +177,13 @@ impl<R: Read> Reading<'_, R> {
         frame.map_err(|e| Error::format(self.name, Place::Whole, format!("the cube of the octree: {e}"), ""))
     }
 
-    /// Puts the octree together; `samples` pushes those of the crossings of brick number i of the file, in order.
+    /// Puts the octree together; `samples` pushes those of the crossings of a brick, in order, given its number in the
+    /// file, unless cells in it were divided.
     fn octree(
         &self,
         decoded: &Decoded,
         with_normals: bool,
-        samples: impl Fn(usize, &Divided, &mut Vec<Sample>) + Sync,
+        samples: impl Fn(Option<usize>, &Divided, &mut Vec<Sample>) + Sync,
     ) -> Result<SignedOctree> {
         let crossings = |brick: &Divided| brick.crossed().iter().map(|plane| u64::from(plane.count())).sum::<u64>();
         if decoded.bricks.iter().map(crossings).sum::<u64>() > u64::from(u32::MAX) {
@@ -188,10 +195,11 @@ impl<R: Read> Reading<'_, R> {
         let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| {
             let brick = &decoded.bricks[i];
             match &decoded.sources {
-                None => samples(i, brick, list),
+                None => samples(Some(i), brick, list),
                 Some(sources) => match sources[i] {
-                    Some(i) => samples(i as usize, brick, list),
-                    None => fill::at_sides(decoded.depth, brick, list),
+                    Source::File(i) => samples(Some(i as usize), brick, list),
+                    Source::Unknown => samples(None, brick, list),
+                    Source::Beside => fill::at_sides(decoded.depth, brick, list),
                 },
             }
         };

@@ -61,7 +61,7 @@ pub(crate) struct HandleArgs {
     #[arg(long, value_name = "AREA", value_parser = amount, allow_negative_numbers = true)]
     fill: Option<f64>,
     /// Remove the smallest handles and tunnels until at most N handles are left; --cut and --fill, where given, bound what is removed.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     genus: Option<u64>,
     /// Cut or fill, whichever is smaller, instead of cutting first.
     #[arg(long)]
