@@ -120,16 +120,16 @@ pub(super) fn half_way(brick: &Divided, samples: &mut Vec<Sample>) {
     }
 }
 
-/// Pushes the samples of a brick beside the file's cube, which is the middle one of 64: the solid ends where the cube does. Between
-/// crossings on its sides nothing is known.
-pub(super) fn at_sides(depth: u32, brick: &Divided, samples: &mut Vec<Sample>) {
+/// Pushes the samples of a brick beside the file's cube, which is so many cells wide in the middle of a larger one: the solid ends where the
+/// cube does. Of other crossings nothing is known.
+pub(super) fn at_sides(depth: u32, cells: u32, brick: &Divided, samples: &mut Vec<Sample>) {
     let origin = lattice_point(depth, brick.key);
     let side = 1 << (depth - LEVELS);
     for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
         for edge in plane.iter() {
             let offset = match origin[axis.index()] + edge.coords()[axis.index()] {
                 start if start + 1 == side => u16::MAX,
-                start if start == 2 * side => 0,
+                start if start == side + cells => 0,
                 _ => HALF_WAY.offset,
             };
             samples.push(Sample::new(offset, straight(axis)));

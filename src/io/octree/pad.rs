@@ -35,6 +35,7 @@ impl Decoded {
         if depth > *DEPTHS.end() {
             return None;
         }
+        let is_small = self.cells < 8;
         self.fill_up();
         let side = 1 << (self.depth - 3);
         let mut beyond =
@@ -56,7 +57,12 @@ impl Decoded {
                 bricks.push((Divided { key, corners }, Source::Beside));
             }
         }
-        let sources = self.sources.unwrap_or_else(|| (0..self.bricks.len() as u32).map(Source::File).collect());
+        // Of small grids, the edges on the sides are in the same brick as those between: nothing is kept of those.
+        let source = |i| if is_small { Source::Beside } else { Source::File(i) };
+        let sources = match self.sources {
+            Some(sources) if !is_small => sources,
+            _ => (0..self.bricks.len() as u32).map(source).collect(),
+        };
         let of_file = self.bricks.into_iter().zip(sources);
         bricks.extend(of_file.map(|(brick, source)| (Divided { key: shifted(brick.key), ..brick }, source)));
         bricks.sort_unstable_by_key(|(brick, _)| brick.key);

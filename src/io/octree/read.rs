@@ -192,6 +192,7 @@ impl<R: Read> Reading<'_, R> {
         }
         let signs: Vec<(Key, Plane)> = decoded.bricks.iter().map(|brick| (brick.key, brick.corners[0])).collect();
         let is_inside = |brick| decoded.is_uniformly_inside(brick);
+        let cells = 1 << self.info.depth;
         let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| {
             let brick = &decoded.bricks[i];
             match &decoded.sources {
@@ -199,7 +200,7 @@ impl<R: Read> Reading<'_, R> {
                 Some(sources) => match sources[i] {
                     Source::File(i) => samples(Some(i as usize), brick, list),
                     Source::Unknown => samples(None, brick, list),
-                    Source::Beside => fill::at_sides(decoded.depth, brick, list),
+                    Source::Beside => fill::at_sides(decoded.depth, cells, brick, list),
                 },
             }
         };
