@@ -407,6 +407,7 @@ fn what_makes_no_sense_is_refused() {
     for (args, problem) in [
         ("topology ring.sof", "--list"),
         ("topology ring.sof 1 out.ply", "SOG THIN GROW OUT"),
+        ("topology ring.sof out.ply", "nothing is asked for"),
         ("topology ring.sof x 1 out.ply", "x is no threshold"),
         ("topology ring.sof 1 1 out.ply --cut 2", "sizes already"),
         ("topology ring.sof out.ply --list", "nothing is written"),

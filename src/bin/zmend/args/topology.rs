@@ -107,7 +107,11 @@ impl TopologyArgs {
         match (&self.rest[..], self.list) {
             ([], true) => Ok(Form::List),
             (_, true) => Err(Error::setting("list", "nothing is written", "leave OUT away")),
-            ([], false) => Err(Error::setting("OUT", "where to?", "name a file to write, or add --list")),
+            ([], false) => Err(Error::setting("OUT", "no file to write is named", "name one, or add --list")),
+            ([_], false) if options.is_nothing() => {
+                let remedy = "add --cut, --fill, --genus, --cheapest, --fill-cavities or --drop-islands, or --list";
+                Err(Error::setting("topology", "nothing is asked for", remedy))
+            }
             ([out], false) => Ok(Form::Write(out, options)),
             ([thin, grow, out], false) => {
                 if !options.is_nothing() {
