@@ -5,6 +5,7 @@ use crate::geom::Frame;
 use crate::mesh::{Bounds, MeshSizes};
 use crate::progress::Stage;
 use crate::sign::{Closing, Kept, ScanCounts};
+use crate::topology::TopologyReport;
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -26,6 +27,8 @@ pub struct RepairReport {
     pub vanished: u64,
     /// Which solids stayed, if any were to be dropped or filled.
     pub kept: Kept,
+    /// What became of handles and tunnels, if the options asked for anything; areas are in squares of cells.
+    pub topology: Option<TopologyReport>,
     /// Grid edges that the final surface crosses.
     pub crossings: u64,
     /// Bricks of 8 x 8 x 8 cells that the octree holds.

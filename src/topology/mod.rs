@@ -61,7 +61,9 @@ mod betti;
 mod complex;
 mod flow;
 mod label;
+mod member;
 mod mend;
+mod options;
 #[cfg(test)]
 mod oracle;
 mod patch;
@@ -75,7 +77,9 @@ mod volumes;
 
 pub use betti::Betti;
 pub use complex::{Complex, Side};
-pub use mend::{Handle, Kind, Loops, Options, TopologyReport, handles, layers, repair_topology};
+pub use member::Members;
+pub use mend::{Handle, Kind, Loops, Round, TopologyReport, handles, layers, repair_topology, repair_topology_watched};
+pub use options::{Measure, Options};
 pub use skeleton::{Arc, Node, Skeleton};
 pub use thin::{Thinned, thin};
 pub use volumes::{move_small, volumes};

@@ -8,7 +8,8 @@
 //! (bridges of the graph, such as the trunk between two handles) need none. Of the others, lines along the axes tell
 //! roughly how thick the solid is at an edge ([`Sections::guess`]), which no neck can hide from; where they are shortest, the section is
 //! taken, and once more at the shortest ones that are at least a width away from there, of which there can be many along a tube.
-//! Where a loop is to be cut, the thinnest is looked for in halving steps around. Cost: some 70 ns a square of the sections taken, in
+//! Where a loop is to be cut, the thinnest is looked for in halving steps around, and in a tube (many times as long as wide) also
+//! every half a width along it. Cost: some 70 ns a square of the sections taken, in
 //! parallel, and 0.3 us an edge of the skeleton.
 
 use super::complex::{Complex, Spot};
@@ -181,20 +182,51 @@ fn thin_place(sections: &mut Sections<'_>, edges: &[Spot]) -> Candidate {
     best
 }
 
-/// The thinnest section near a thin one.
-fn refined(sections: &mut Sections<'_>, edges: &[Spot], mut best: Candidate) -> Loop {
+/// Arcs of so many widths of their section are tubes.
+const LONG: usize = 8;
+/// Sections of a tube that are so many times as large as the thinnest are as good, if they have fewer squares: less is changed there.
+const AS_GOOD: f64 = 1.0 + 1.0 / 12.0;
+
+/// The thinnest section near a thin one; of a tube, where many are about the same, one of those with the fewest squares.
+fn refined(sections: &mut Sections<'_>, edges: &[Spot], best: Candidate) -> Loop {
+    let wide = width(best.section.area);
+    let mut best = best;
+    let mut taken = Vec::new();
+    if edges.len() > LONG * wide {
+        taken.extend((0..edges.len()).step_by(wide.div_ceil(2)).map(|i| take(sections, edges, i)));
+        taken.push(best);
+        best = taken.iter().min_by(|a, b| a.cost().total_cmp(&b.cost())).expect("one at least").clone();
+    }
+    best = around(sections, edges, best, Candidate::cost);
+    if !taken.is_empty() {
+        let bound = taken.iter().fold(best.section.area, |least, other| least.min(other.section.area)) * AS_GOOD;
+        let squares = |c: &Candidate| if c.section.area <= bound { c.section.squares as f64 } else { f64::INFINITY };
+        taken.push(best);
+        let fewest = taken.into_iter().min_by(|a, b| squares(a).total_cmp(&squares(b))).expect("one at least");
+        best = around(sections, edges, fewest, squares);
+    }
+    Loop { edge: best.edge, centre: sections.centre(best.edge), section: best.section }
+}
+
+/// The best section in halving steps around one.
+fn around(
+    sections: &mut Sections<'_>,
+    edges: &[Spot],
+    mut best: Candidate,
+    cost: impl Fn(&Candidate) -> f64,
+) -> Candidate {
     let mut step = width(best.section.area).div_ceil(4);
     while step > 0 {
         let middle = best.place;
         for i in [middle.checked_sub(step), Some(middle + step)].into_iter().flatten().filter(|&i| i < edges.len()) {
             let other = take(sections, edges, i);
-            if other.cost() < best.cost() {
+            if cost(&other) < cost(&best) {
                 best = other;
             }
         }
         step /= 2;
     }
-    Loop { edge: best.edge, centre: sections.centre(best.edge), section: best.section }
+    best
 }
 
 #[cfg(test)]
@@ -225,6 +257,6 @@ mod tests {
                 }
             }
         }
-        assert!(seen.iter().all(|&count| count > 20), "{seen:?}");
+        assert!(seen.iter().all(|&count| count > 4), "{seen:?}");
     }
 }

@@ -26,6 +26,7 @@ const CUT: Options = Options {
     cheapest: false,
     fill_cavities: None,
     drop_islands: None,
+    measure: Measure::Area,
 };
 const FILL: Options = Options { cut: None, fill: Some(f64::INFINITY), ..CUT };
 
