@@ -225,6 +225,6 @@ mod tests {
                 }
             }
         }
-        assert!(seen.iter().all(|&count| count > 20), "{seen:?}");
+        assert!(seen.iter().all(|&count| count > 4), "{seen:?}");
     }
 }
