@@ -458,29 +458,31 @@ fn too_fine_to_be_put_into_a_larger_cube() {
     assert!(error.contains("disagree") || error.contains("too fine"), "{error}");
 }
 
+/// The nodes of an SOF file below a cell, with leaves of `coarse` cells in one half.
+fn simplified(at: [u32; 3], side: u32, coarse: u32, inside: &dyn Fn([u32; 3]) -> bool, out: &mut Vec<u8>) {
+    let corners = (0..8u32).map(|i| inside(std::array::from_fn(|a| at[a] + side * (i >> (2 - a) & 1))));
+    let mask = corners.enumerate().fold(0u8, |mask, (i, is_in)| mask | u8::from(!is_in) << i);
+    if side <= coarse {
+        out.extend(if [0, 255].contains(&mask) { [1, mask & 1] } else { [2, mask] });
+        return;
+    }
+    out.push(0);
+    for i in 0..8u32 {
+        // One half is fine, the other one is coarse.
+        let child: [u32; 3] = std::array::from_fn(|a| at[a] + side / 2 * (i >> (2 - a) & 1));
+        let coarse = if side == 16 && i >= 4 { 1 } else { coarse };
+        simplified(child, side / 2, coarse, inside, out);
+    }
+}
+
 #[test]
 fn surface_cells_above_the_finest_level_are_divided() {
     // A ball, of which cells of two finest ones are surface cells wherever they may be.
     let cells = 16u32;
     let inside = |p: [u32; 3]| p.iter().map(|&c| (f64::from(c) - 8.1).powi(2)).sum::<f64>() < 25.0;
-    fn node(at: [u32; 3], side: u32, coarse: u32, inside: &dyn Fn([u32; 3]) -> bool, out: &mut Vec<u8>) {
-        let corners = (0..8u32).map(|i| inside(std::array::from_fn(|a| at[a] + side * (i >> (2 - a) & 1))));
-        let mask = corners.enumerate().fold(0u8, |mask, (i, is_in)| mask | u8::from(!is_in) << i);
-        if side <= coarse {
-            out.extend(if [0, 255].contains(&mask) { [1, mask & 1] } else { [2, mask] });
-            return;
-        }
-        out.push(0);
-        for i in 0..8u32 {
-            // One half is fine, the other one is coarse.
-            let child: [u32; 3] = std::array::from_fn(|a| at[a] + side / 2 * (i >> (2 - a) & 1));
-            let coarse = if side == 16 && i >= 4 { 1 } else { coarse };
-            node(child, side / 2, coarse, inside, out);
-        }
-    }
     for coarse in [1, 2, 4] {
         let mut bytes = (cells as i32).to_le_bytes().to_vec();
-        node([0; 3], cells, coarse, &inside, &mut bytes);
+        simplified([0; 3], cells, coarse, &inside, &mut bytes);
         let file = read_octree_bytes("coarse", &bytes, Some(OctreeFormat::Sof)).expect("consistent");
         assert_eq!((file.octree.validate(), file.info.is_padded), (Ok(()), false));
         let mut mesh = Mesh::default();

@@ -78,16 +78,18 @@ fn gyroid(p: DVec3) -> f64 {
     (g.abs() - 0.5).max((p - 0.5).length() - 0.42)
 }
 
+/// The least member of a set.
+fn root(parent: &mut [usize], mut a: usize) -> usize {
+    while parent[a] != a {
+        parent[a] = parent[parent[a]];
+        a = parent[a];
+    }
+    a
+}
+
 /// The genus of each component of a closed mesh, ascending; counted here.
 fn genera(mesh: &Mesh) -> Vec<i64> {
     let mut parent: Vec<usize> = (0..mesh.points.len()).collect();
-    fn root(parent: &mut [usize], mut a: usize) -> usize {
-        while parent[a] != a {
-            parent[a] = parent[parent[a]];
-            a = parent[a];
-        }
-        a
-    }
     for face in mesh.faces.iter() {
         for pair in face.windows(2) {
             let (a, b) = (root(&mut parent, pair[0] as usize), root(&mut parent, pair[1] as usize));
@@ -333,7 +335,7 @@ fn the_program_takes_octrees_as_the_original_does() {
         assert_eq!(skeleton.phases.len(), phases);
         let removed: Vec<f32> =
             skeleton.phases[0].iter().filter(|r| r.kind == skt::Kind::CutEdge).map(|r| r.weight).collect();
-        assert_eq!(removed.len(), if sizes.starts_with("1e9") { 1 } else { 0 });
+        assert_eq!(removed.len(), usize::from(sizes.starts_with("1e9")));
         assert!(removed.iter().all(|&weight| (f64::from(weight) / 137.70 - 1.0).abs() < 0.1), "{removed:?}");
     }
     // Points of cells that nothing touches are those of the file.

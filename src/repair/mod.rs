@@ -141,6 +141,9 @@ fn mend(
         let (mended, report) = clock.time(Stage::Topology, || solid.mended(&options.topology, progress))?;
         (solid, topology) = (mended, Some(report));
     }
+    if options.no_self_intersections && solid.octree.is_edited() && options.surface != Surface::Blocks {
+        warnings.push(Warning::MayIntersect);
+    }
     let octree = solid.signed();
 
     if !bounds.is_empty() && octree.crossings().is_empty() {

@@ -65,6 +65,8 @@ pub enum Warning {
     WallsMerged(u64),
     /// At so many points of the grid the surface reached the grid's boundary and was clipped.
     Clipped(u64),
+    /// Faces at cuts and fills may pass through each other although it was asked that none do.
+    MayIntersect,
 }
 
 impl fmt::Display for Warning {
@@ -93,6 +95,9 @@ impl fmt::Display for Warning {
                 f,
                 "about {n} % of the input's surface bounds no solid and vanished; --thicken WIDTH gives open sheets a wall"
             ),
+            Warning::MayIntersect => {
+                write!(f, "faces may pass through each other where handles were cut or tunnels filled")
+            }
             Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (grid edges concerned: {n})"),
         }
     }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use zmend::io::{self, OctreeFormat, OctreeInfo, WriteOptions};
 use zmend::mesh::MeshSizes;
 use zmend::progress::{Progress, Stage};
-use zmend::repair::{Trace, membranes};
+use zmend::repair::{Trace, Warning, membranes};
 use zmend::topology::{self, Kind, TopologyReport};
 use zmend::{Error, Faces, Options, RepairReport, Result, Solid, Surface, solidify};
 
@@ -219,6 +219,10 @@ impl Outcome<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut warnings = self.source.warnings(self.job.to);
+        let may_intersect = self.options.no_self_intersections && self.options.surface != Surface::Blocks;
+        if may_intersect && self.sizes.is_some() && self.solid.octree.is_edited() {
+            warnings.push(Warning::MayIntersect.to_string());
+        }
         if self.is_refined {
             let cells = 1u64 << self.solid.frame.depth();
             warnings.push(format!(
