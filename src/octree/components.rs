@@ -11,11 +11,11 @@
 //! Cost: that of [`Regions`], and some population counts a brick to measure them; independent of the volume.
 
 use super::cells::Cells;
-use super::crossings::{Brick, Builder, Crossings};
+use super::crossings::{Brick, Builder, Crossings, finest_element, owner};
 use super::regions::Regions;
 use super::signed::SignedOctree;
 use crate::grid::brick::Plane;
-use crate::grid::{Axis, Face, Key};
+use crate::grid::{Axis, Extent, Face, Key};
 use crate::parallel::pieces;
 use rayon::prelude::*;
 
@@ -60,6 +60,23 @@ impl<'a> Components<'a> {
     /// Cavities in all.
     pub fn cavities(&self) -> impl Iterator<Item = &Component> {
         self.list[1..].iter().filter(|c| !c.is_inside)
+    }
+
+    /// The component of a lattice point, in cells. Cost: a hash probe, and a look at the parts of its brick or a binary search.
+    ///
+    /// # Panics
+    /// When the point lies on the high sides of the root, or beyond.
+    pub fn of_point(&self, at: [u32; 3]) -> u32 {
+        let crossings = self.octree.crossings();
+        let (brick, local) = owner(crossings.depth(), finest_element(crossings.depth(), at, Extent::POINT));
+        let brick = brick.expect("the point lies in the root");
+        match crossings.find(brick) {
+            Some(i) => {
+                let part = self.regions.parts(i).find(|(_, part)| part.get(local));
+                part.expect("every point of a brick lies in a part").0
+            }
+            None => self.regions.of_absent(brick),
+        }
     }
 
     fn measure(&mut self) {

@@ -43,6 +43,13 @@ impl StoredPoints {
         self.points.extend_from_slice(points);
     }
 
+    /// The same points in bricks of other names, which must come in the same order.
+    pub(crate) fn renamed(mut self, name: impl Fn(Key) -> Key) -> Self {
+        self.bricks.iter_mut().for_each(|brick| brick.key = name(brick.key));
+        debug_assert!(self.bricks.is_sorted_by(|a, b| a.key < b.key), "bricks stay in order");
+        self
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()

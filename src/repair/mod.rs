@@ -4,14 +4,17 @@ mod hull;
 mod inside;
 mod memory;
 mod options;
+mod refined;
 mod report;
 mod solid;
+mod trace;
 
 pub use crate::sign::{Keep, Kept, Thicken};
 pub use inside::{InsideChoice, Reason};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 pub use solid::Solid;
+pub use trace::{Trace, TracedRound, membranes};
 
 use crate::error::{Error, Result};
 use crate::geom::Frame;
@@ -132,6 +135,16 @@ fn mend(
         octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
     }
     let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
+    let mut solid = Solid::new(octree, frame);
+    let mut topology = None;
+    if !options.topology.is_nothing() {
+        let (mended, report) = clock.time(Stage::Topology, || solid.mended(&options.topology, progress))?;
+        (solid, topology) = (mended, Some(report));
+    }
+    if options.no_self_intersections && solid.octree.is_edited() && options.surface != Surface::Blocks {
+        warnings.push(Warning::MayIntersect);
+    }
+    let octree = solid.signed();
 
     if !bounds.is_empty() && octree.crossings().is_empty() {
         warnings.push(Warning::NothingEnclosed);
@@ -153,6 +166,7 @@ fn mend(
         inside: choice,
         vanished,
         kept,
+        topology,
         crossings: octree.crossings().len() as u64,
         bricks: octree.crossings().bricks().len() as u64,
         octree_bytes: octree.bytes() as u64,
@@ -161,7 +175,7 @@ fn mend(
         warnings,
         times: clock.times,
     };
-    Ok((Solid { octree, frame, points: None }, report))
+    Ok((solid, report))
 }
 
 /// Refuses what can be told before anything is read.

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::geom::{Cube, Frame};
 use crate::mesh::Bounds;
 use crate::sign::{Keep, Thicken};
+use crate::topology;
 
 /// How to repair: `Options { depth: 9, ..Options::default() }`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +43,9 @@ pub struct Options {
     pub keep: Keep,
     /// Whether cavities of solids are filled. Default no.
     pub drop_cavities: bool,
+    /// Which handles are cut and which tunnels are filled, in the end: here, areas are in model units squared and volumes in model units
+    /// cubed. Default: none.
+    pub topology: topology::Options,
 }
 
 impl Default for Options {
@@ -61,6 +65,7 @@ impl Default for Options {
             thicken_what: Thicken::default(),
             keep: Keep::default(),
             drop_cavities: false,
+            topology: topology::Options::default(),
         }
     }
 }
@@ -93,7 +98,8 @@ impl Options {
 /// The kinds of surfaces that can be extracted. All have the same topology.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Surface {
-    /// Marching cubes: triangles, one point where the surface crosses an edge of the grid.
+    /// Marching cubes: triangles, one point where the surface crosses an edge of the grid. After cuts or fills, which have no such edges,
+    /// it is [`Surface::Quads`] in triangles, whose points lie next to those.
     #[default]
     MarchingCubes,
     /// Dual contouring: one point a cell, which keeps sharp edges and corners.

@@ -5,6 +5,7 @@ use crate::geom::Frame;
 use crate::mesh::{Bounds, MeshSizes};
 use crate::progress::Stage;
 use crate::sign::{Closing, Kept, ScanCounts};
+use crate::topology::TopologyReport;
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -26,6 +27,8 @@ pub struct RepairReport {
     pub vanished: u64,
     /// Which solids stayed, if any were to be dropped or filled.
     pub kept: Kept,
+    /// What became of handles and tunnels, if the options asked for anything; areas are in squares of cells.
+    pub topology: Option<TopologyReport>,
     /// Grid edges that the final surface crosses.
     pub crossings: u64,
     /// Bricks of 8 x 8 x 8 cells that the octree holds.
@@ -62,6 +65,8 @@ pub enum Warning {
     WallsMerged(u64),
     /// At so many points of the grid the surface reached the grid's boundary and was clipped.
     Clipped(u64),
+    /// Faces at cuts and fills may pass through each other although it was asked that none do.
+    MayIntersect,
 }
 
 impl fmt::Display for Warning {
@@ -90,6 +95,9 @@ impl fmt::Display for Warning {
                 f,
                 "about {n} % of the input's surface bounds no solid and vanished; --thicken WIDTH gives open sheets a wall"
             ),
+            Warning::MayIntersect => {
+                write!(f, "faces may pass through each other where handles were cut or tunnels filled")
+            }
             Warning::WallsMerged(n) => write!(f, "duplicate faces were counted once (grid edges concerned: {n})"),
         }
     }

@@ -1,12 +1,15 @@
 //! A solid on a grid, from a mesh or from a file, and what can be made of it.
 
+use super::refined::refined;
 use super::{Faces, Options, Surface};
-use crate::contour::{CellVertices, DualOptions, Intersections, Placement, dual_contouring, marching_cubes};
+use crate::contour::{CellVertices, DualOptions, Intersections, Placement, dual_contouring_edited, marching_cubes};
 use crate::error::{Error, Result};
 use crate::geom::Frame;
+use crate::io::OctreeFile;
 use crate::mesh::{MeshSink, MeshSizes};
-use crate::octree::{CellPoints, SignedOctree, StoredPoints};
+use crate::octree::{CellPoints, EditedOctree, SignedOctree, StoredPoints};
 use crate::progress::Progress;
+use crate::topology::{self, Round, TopologyReport, repair_topology_watched};
 
 /// A solid: inside and outside on a grid, and where the surface crosses it.
 ///
@@ -14,10 +17,14 @@ use crate::progress::Progress;
 ///
 /// ```no_run
 /// use zmend::progress::Silent;
-/// use zmend::{Mesh, Options, Solid, Surface, io};
+/// use zmend::{Mesh, Options, Solid, Surface, io, topology};
 ///
 /// let file = io::read_octree("part.sog", &Silent)?;
-/// let solid = Solid { octree: file.octree, frame: file.frame, points: file.points };
+/// let solid = Solid::from(file);
+/// // Handles of less than two square units are cut.
+/// let thin = topology::Options { cut: Some(2.0), ..topology::Options::default() };
+/// let (solid, report) = solid.mended(&thin, &Silent)?;
+/// println!("{} cuts", report.cuts.len());
 /// let options = Options { surface: Surface::DualContouring, ..Options::default() };
 /// let mut mesh = Mesh::default();
 /// solid.extract(&options, &mut mesh, &Silent)?;
@@ -25,16 +32,70 @@ use crate::progress::Progress;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Solid {
-    /// Inside and outside.
-    pub octree: SignedOctree,
+    /// Inside and outside, and what topology repair made of it.
+    pub octree: EditedOctree,
     /// Where the grid lies.
     pub frame: Frame,
     /// Points that the cells with surface have already: [`Surface::DualContouring`] takes them.
     pub points: Option<StoredPoints>,
 }
 
+impl From<OctreeFile> for Solid {
+    fn from(OctreeFile { octree, frame, points, .. }: OctreeFile) -> Self {
+        Solid { octree: EditedOctree::unedited(octree), frame, points }
+    }
+}
+
 impl Solid {
-    /// Extracts the surface that the options ask for and passes it to `sink`; returns its size. Depth and scale play no part.
+    /// A solid of signs and crossings.
+    pub fn new(octree: SignedOctree, frame: Frame) -> Self {
+        Solid { octree: EditedOctree::unedited(octree), frame, points: None }
+    }
+
+    /// Signs and crossings, which know nothing of cuts and fills.
+    pub fn signed(&self) -> &SignedOctree {
+        self.octree.signed()
+    }
+
+    /// Repairs the topology: see [`topology`]. Areas are in model units squared, volumes in model units cubed; those of the report are
+    /// in squares of cells. Cuts and fills that were made before are forgotten.
+    ///
+    /// # Errors
+    /// When an option is out of range, and `Cancelled`.
+    pub fn mended(self, options: &topology::Options, progress: &dyn Progress) -> Result<(Solid, TopologyReport)> {
+        self.mended_watched(options, &mut |_| Ok(()), progress)
+    }
+
+    /// As [`mended`](Self::mended), and shows each round to `watch`, a [`Trace`](super::Trace) for instance.
+    ///
+    /// # Errors
+    /// As [`mended`](Self::mended), and whatever `watch` returns.
+    pub fn mended_watched(
+        self,
+        options: &topology::Options,
+        watch: &mut dyn FnMut(&Round<'_>) -> Result<()>,
+        progress: &dyn Progress,
+    ) -> Result<(Solid, TopologyReport)> {
+        let Solid { octree, frame, points } = self;
+        let in_cells = options.in_cells(frame.cell_size());
+        let (octree, report) = repair_topology_watched(octree.into_signed(), &in_cells, watch, progress)?;
+        Ok((Solid { octree, frame, points }, report))
+    }
+
+    /// The same solid told by signs alone, as octree files need it: itself if there are no cuts and fills, and otherwise on a grid twice
+    /// as fine. Its topology is the same; its surface is drawn back to within half an old cell of what is inside.
+    ///
+    /// # Errors
+    /// When the grid is as fine as can be already, or something was added on the side of its cube.
+    pub fn told_by_signs(self) -> Result<Solid> {
+        if !self.octree.is_edited() {
+            return Ok(self);
+        }
+        let (octree, frame) = refined(&self.octree, &self.frame)?;
+        Ok(Solid::new(octree, frame))
+    }
+
+    /// Extracts the surface that the options ask for and passes it to `sink`; returns its size. Depth, scale and topology play no part.
     ///
     /// # Errors
     /// When the surface needs normals and the octree has none, whatever `sink` returns, and `Cancelled`.
@@ -45,20 +106,23 @@ impl Solid {
         progress: &dyn Progress,
     ) -> Result<MeshSizes> {
         let Solid { octree, frame, points } = self;
-        if options.surface == Surface::MarchingCubes {
-            return marching_cubes(octree, frame, sink, progress);
+        let is_marching = options.surface == Surface::MarchingCubes;
+        if is_marching && !octree.is_edited() {
+            return marching_cubes(octree.signed(), frame, sink, progress);
         }
         let placement = match points {
             Some(points) if options.surface == Surface::DualContouring => Placement::Given { points, frame },
+            // What lies next to the points of marching cubes.
+            _ if is_marching => Placement::MassPoint,
             _ => self.placement(options.surface)?,
         };
         let intersections = if options.no_self_intersections { Intersections::Avoid } else { Intersections::Allow };
         let triangles = match options.faces {
-            Faces::Auto => options.surface == Surface::DualContouring,
+            Faces::Auto => options.surface == Surface::DualContouring || is_marching,
             Faces::Triangles => true,
-            Faces::Polygons => false,
+            Faces::Polygons => is_marching,
         };
-        dual_contouring(octree, frame, &DualOptions { placement, triangles, intersections }, sink, progress)
+        dual_contouring_edited(octree, frame, &DualOptions { placement, triangles, intersections }, sink, progress)
     }
 
     /// One point for each cell with surface, for SOG files: where `surface` has its vertices. Marching cubes have none, and take those of
@@ -80,7 +144,7 @@ impl Solid {
             Surface::Quads => Ok(Placement::MassPoint),
             Surface::Blocks => Ok(Placement::Centre),
             Surface::DualContouring | Surface::MarchingCubes => {
-                let crossings = self.octree.crossings();
+                let crossings = self.signed().crossings();
                 if crossings.with_normals() || crossings.is_empty() {
                     return Ok(Placement::SharpFeatures);
                 }

@@ -117,14 +117,6 @@ pub(super) struct Spot {
     pub(super) local: Local,
 }
 
-impl Spot {
-    /// All of it in one word.
-    #[inline]
-    pub(super) fn pack(self) -> u64 {
-        u64::from(self.brick) << 12 | u64::from(self.extent.bits()) << 9 | u64::from(self.local.index())
-    }
-}
-
 impl Complex {
     /// The elements of the solid, or the dual of all others. Cost: some 0.5 us a listed brick, in parallel.
     pub fn new(octree: &EditedOctree, side: Side) -> Complex {
@@ -334,18 +326,24 @@ impl Complex {
         if inward != face.is_high() {
             return Some(Spot { extent, ..spot });
         }
+        let (brick, local) = self.step(spot.brick, spot.local, face)?;
+        Some(Spot { brick, extent, local })
+    }
+
+    /// The brick and the position one step further on one side. None outside of all listed bricks.
+    #[inline]
+    pub(super) fn step(&self, brick: u32, local: Local, face: Face) -> Option<(u32, Local)> {
         // The coordinates of a position are three bits each, x highest.
-        let place = 6 - 3 * axis.index() as u32;
-        let (index, one) = (spot.local.index(), 1 << place);
+        let place = 6 - 3 * face.axis().index() as u32;
+        let (index, one) = (local.index(), 1 << place);
         let c = index >> place & 7;
         let (across, next) = if face.is_high() {
             (c == 7, if c == 7 { index - 7 * one } else { index + one })
         } else {
             (c == 0, if c == 0 { index + 7 * one } else { index - one })
         };
-        let local = Local::from_index(next);
-        let brick = if across { self.beside(spot.brick, face) } else { spot.brick };
-        (brick < DEEP).then_some(Spot { brick, extent, local })
+        let brick = if across { self.beside(brick, face) } else { brick };
+        (brick < DEEP).then_some((brick, Local::from_index(next)))
     }
 
     /// The elements of a brick as they were before anything was removed; `octree` is what the complex was made of.

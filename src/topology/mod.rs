@@ -26,8 +26,8 @@
 //!
 //! # Cost
 //!
-//! Without a threshold a few ns for each element of the volume, 8 elements a cell, and 768 bytes a brick; with one, of the layer along the
-//! surface that is as deep as the threshold is wide. Sections take most of the rest.
+//! Without a threshold some 4 ns for each element of the volume, 8 elements a cell, and 768 bytes a brick; with one, of the layer along the
+//! surface that is as deep as the threshold is wide. Where handles are many, sections take as long again. (docs/benchmarks.md)
 //!
 //! ```
 //! use zmend::grid::brick::{Local, Plane};
@@ -59,8 +59,11 @@
 
 mod betti;
 mod complex;
+mod flow;
 mod label;
+mod member;
 mod mend;
+mod options;
 #[cfg(test)]
 mod oracle;
 mod patch;
@@ -74,7 +77,9 @@ mod volumes;
 
 pub use betti::Betti;
 pub use complex::{Complex, Side};
-pub use mend::{Handle, Kind, Loops, Options, TopologyReport, handles, layers, repair_topology};
+pub use member::Members;
+pub use mend::{Handle, Kind, Loops, Round, TopologyReport, handles, layers, repair_topology, repair_topology_watched};
+pub use options::{Measure, Options};
 pub use skeleton::{Arc, Node, Skeleton};
 pub use thin::{Thinned, thin};
 pub use volumes::{move_small, volumes};

@@ -12,7 +12,7 @@
 //! Cost: some 100 ns an element of the patches.
 
 use super::complex::{Complex, Planes, Spot};
-use super::section::partner;
+use super::flow::partner;
 use crate::grid::{Extent, Face, Key};
 use crate::octree::EditedOctree;
 use crate::octree::edited::alternating;
@@ -68,7 +68,7 @@ impl Patch<'_> {
             return;
         }
         if spot.extent.dimension() == 2
-            && let Some((_, edge)) = partner(complex, spot)
+            && let Some(edge) = partner(complex, spot)
         {
             self.add(edge);
         }

@@ -26,6 +26,7 @@ const CUT: Options = Options {
     cheapest: false,
     fill_cavities: None,
     drop_islands: None,
+    measure: Measure::Area,
 };
 const FILL: Options = Options { cut: None, fill: Some(f64::INFINITY), ..CUT };
 
@@ -209,7 +210,7 @@ fn threads_make_no_difference() {
     let one = run(1);
     assert!(!one.0.is_empty() && !one.1.is_empty());
     assert_eq!(one, run(2));
-    assert_eq!(one, run(5));
+    assert_eq!(one, run(3));
 }
 
 #[test]

@@ -27,7 +27,8 @@
 //!
 //! # Cost
 //!
-//! Some 0.4 us a brick and step; a front needs 8 to 14 steps to cross a brick: 1 to 1.5 ns an element.
+//! Some 0.4 us a brick and step; a front is in a brick for some 20 steps, the rim of its sheet included: 3 ns an element. Beside the complex,
+//! 700 bytes for each brick that a front is in.
 
 use super::complex::{Brick, Complex, DEEP, Planes, Record};
 use crate::error::Result;
@@ -85,30 +86,37 @@ pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress)
     let before = complex.count();
     let listed = complex.bricks.len();
     let mut active = first_front(complex);
-    let mut place_of = Vec::new();
+    let (mut marks, mut place_of) = (Vec::new(), Vec::new());
     loop {
         check(progress)?;
         let axes = ERODED[done.steps as usize % ERODED.len()];
         let erode = if layers.is_none_or(|layers| done.steps < layers) { Some(axes) } else { None };
-        let mut marks: Vec<Marks> =
-            active.par_iter().with_min_len(GRAIN).filter_map(|&brick| Marks::of(complex, brick, erode)).collect();
-        if marks.is_empty() {
+        marks.resize_with(active.len(), Marks::default);
+        marks
+            .par_iter_mut()
+            .zip(&active)
+            .with_min_len(GRAIN)
+            .for_each(|(marks, &brick)| marks.find(complex, brick, erode));
+        if marks.iter().all(|marks| marks.kinds == 0 && !marks.waiting) {
             // Bricks that were opened were full.
             let opened = complex.bricks.len() - listed;
             done.removed = (before + opened as u64 * 4096).saturating_sub(complex.count());
             return Ok(done);
         }
+        Step::new(complex, &marks, &mut place_of).run(complex, &mut active);
         // Faces whose turn has not come yet are waited for.
-        let waiting: Vec<u32> = marks.iter().filter(|marks| marks.waiting).map(|marks| marks.brick).collect();
-        marks.retain(|marks| marks.kinds != 0);
-        let step = Step::new(complex, &marks, &mut place_of);
-        step.run(complex, &mut active);
-        active.extend(waiting);
-        active.sort_unstable();
-        active.dedup();
+        active.extend(marks.iter().filter(|marks| marks.waiting).map(|marks| marks.brick));
+        merge(&mut active);
         done.steps += 1;
         progress.advance(1);
     }
+}
+
+/// Sorts a list of a few runs that are in order, without duplicates.
+#[expect(clippy::stable_sort_primitive, reason = "stable sorts merge runs")]
+fn merge(list: &mut Vec<u32>) {
+    list.sort();
+    list.dedup();
 }
 
 /// The bricks in or beside which something is missing: all others have no element with exactly one coface.
@@ -131,55 +139,94 @@ fn first_front(complex: &mut Complex) -> Vec<u32> {
 }
 
 /// The elements of a brick with exactly one coface.
+#[derive(Default)]
 struct Marks {
     brick: u32,
     /// By extent; bit e is set where plane e is not empty.
     kinds: u8,
     /// Whether there are faces that would be marked if erosion went along their normal in this step.
     waiting: bool,
-    planes: Box<[Plane; 7]>,
+    /// Where the bit of an extent is not set, what was there before.
+    planes: [Plane; 7],
 }
 
 impl Marks {
-    /// None if there are no such elements, nor any that wait.
-    fn of(complex: &Complex, brick: u32, erode: Option<Extent>) -> Option<Marks> {
+    /// Finds those of a brick; cells are eroded along the axes in `erode`.
+    fn find(&mut self, complex: &Complex, brick: u32, erode: Option<Extent>) {
+        (self.brick, self.kinds, self.waiting) = (brick, 0, false);
         let live = complex.live(brick);
         let low = Axis::ALL.map(|axis| complex.live(complex.beside(brick, Face::new(axis, false))));
-        let mut planes = [Plane::EMPTY; 7];
-        let (mut kinds, mut waiting) = (0, false);
-        for extent in &Extent::ALL[..7] {
-            let here = live[extent.index()];
-            if here.is_empty() || extent.dimension() == 2 && erode.is_none() {
-                continue;
+        let mut any = [0; 7];
+        for x in 0..8 {
+            let marked = once_covered(live, low, x);
+            for (extent, word) in marked.into_iter().enumerate() {
+                any[extent] |= word;
+                self.planes[extent].0[x] = word;
             }
-            let (mut once, mut twice) = (Plane::EMPTY, Plane::EMPTY);
-            for axis in extent.complement().axes() {
-                let upper = (*extent | axis).index();
-                let above = live[upper];
-                twice |= once & above;
-                once |= above;
-                let below = above.at_minus(axis, &low[axis.index()][upper]);
-                twice |= once & below;
-                once |= below;
-            }
-            let marked = here & once & !twice;
-            let normal = extent.complement().axes().next().expect("not a cell");
-            if extent.dimension() == 2 && erode.is_none_or(|axes| !axes.contains(normal)) {
-                waiting |= !marked.is_empty();
-                continue;
-            }
-            kinds |= u8::from(!marked.is_empty()) << extent.index();
-            planes[extent.index()] = marked;
         }
-        (kinds != 0 || waiting).then(|| Marks { brick, kinds, waiting, planes: Box::new(planes) })
+        for axis in Axis::ALL.into_iter().filter(|&axis| erode.is_none_or(|axes| !axes.contains(axis))) {
+            let face = !Extent::from(axis);
+            self.waiting |= erode.is_some() && any[face.index()] != 0;
+            any[face.index()] = 0;
+        }
+        self.kinds = any.iter().rev().fold(0, |kinds, &word| kinds << 1 | u8::from(word != 0));
+    }
+
+    fn plane(&self, extent: Extent) -> Option<&Plane> {
+        (self.kinds >> extent.index() & 1 == 1).then(|| &self.planes[extent.index()])
     }
 }
+
+/// Word `x` of the planes of all elements with exactly one coface, by extent; `low` are the low neighbours of the brick.
+///
+/// Everything word by word, so that it stays in registers: some 150 operations a word.
+#[inline]
+fn once_covered(live: &Planes, low: [&Planes; 3], x: usize) -> [u64; 7] {
+    let here = |extent: Extent| live[extent.index()].0[x];
+    // Of the two cofaces along an axis: whether it is just one, and whether it is both.
+    let along = |upper: Extent, axis: Axis| {
+        let next = &low[axis.index()][upper.index()];
+        let (above, upper) = (here(upper), upper.index());
+        let below = match axis {
+            Axis::X => {
+                if x == 0 {
+                    next.0[7]
+                } else {
+                    live[upper].0[x - 1]
+                }
+            }
+            Axis::Y => above << 8 | next.0[x] >> 56,
+            Axis::Z => above << 1 & !Z0 | next.0[x] >> 7 & Z0,
+        };
+        (above ^ below, above & below)
+    };
+    let mut marked = [0; 7];
+    let of = |axis: Axis| along(Extent::from(axis), axis);
+    let ((a, aa), (b, bb), (c, cc)) = (of(Axis::X), of(Axis::Y), of(Axis::Z));
+    marked[Extent::POINT.index()] = here(Extent::POINT) & (a ^ b ^ c) & !(a & b & c | aa | bb | cc);
+    for axis in Axis::ALL {
+        let edge = Extent::from(axis);
+        let [u, v] = axis.others();
+        let ((a, aa), (b, bb)) = (along(edge | u, u), along(edge | v, v));
+        marked[edge.index()] = here(edge) & (a ^ b) & !(aa | bb);
+        let face = !edge;
+        marked[face.index()] = here(face) & along(Extent::CELL, axis).0;
+    }
+    marked
+}
+
+/// Bits with z = 0 of a word of a plane.
+const Z0: u64 = 0x0101_0101_0101_0101;
 
 /// A brick in which something is chosen.
 struct Work {
     place: u32,
-    brick: Brick,
-    before: Planes,
+    around: [u32; 6],
+    live: Option<Box<Planes>>,
+    record: Option<Box<Record>>,
+    /// What the brick has lost: bit 3 if anything, and for each axis (bits 0 to 2) whether something of that lies in the high layer
+    /// and extends along it.
+    lost: u8,
     /// For each pair of extents, what was chosen in the layer next to the high neighbour and has its lower part there.
     carries: [u64; 12],
 }
@@ -196,30 +243,28 @@ struct Step<'a> {
 
 impl<'a> Step<'a> {
     fn new(complex: &mut Complex, marks: &'a [Marks], place_of: &'a mut Vec<u32>) -> Self {
-        let mut uppers: Vec<u32> = Vec::with_capacity(marks.len() + marks.len() / 2);
+        let mut beside = Vec::new();
         for mark in marks {
-            uppers.push(mark.brick);
+            let reaches_low =
+                |&(extent, axis): &(Extent, Axis)| mark.plane(extent).is_some_and(|p| p.touches_min(axis));
             for axis in Axis::ALL {
-                let touches = |&&(extent, other): &&(Extent, Axis)| {
-                    other == axis
-                        && mark.kinds >> extent.index() & 1 == 1
-                        && mark.planes[extent.index()].touches_min(axis)
-                };
-                if PAIRS.iter().find(touches).is_some() {
-                    uppers.extend(complex.open(mark.brick, Face::new(axis, false)));
+                if PAIRS.iter().filter(|(_, other)| *other == axis).any(reaches_low) {
+                    beside.extend(complex.open(mark.brick, Face::new(axis, false)));
                 }
             }
         }
-        uppers.sort_unstable();
-        uppers.dedup();
+        let mut uppers: Vec<u32> = marks.iter().filter(|mark| mark.kinds != 0).map(|mark| mark.brick).collect();
+        beside.sort_unstable();
+        beside.dedup();
+        uppers.extend(beside);
+        merge(&mut uppers);
         place_of.resize(complex.bricks.len(), NO_MARKS);
-        (0..).zip(marks.iter()).for_each(|(place, mark)| place_of[mark.brick as usize] = place);
+        for (place, mark) in (0..).zip(marks).filter(|(_, mark)| mark.kinds != 0) {
+            place_of[mark.brick as usize] = place;
+        }
         let take = |place: u32| {
-            let brick = &mut complex.bricks[place as usize];
-            let (live, record) = (brick.live.take(), brick.record.take());
-            let before = live.as_deref().copied().unwrap_or([Plane::EMPTY; 8]);
-            let brick = Brick { key: brick.key, around: brick.around, live, record };
-            Work { place, brick, before, carries: [0; 12] }
+            let Brick { around, live, record, .. } = &mut complex.bricks[place as usize];
+            Work { place, around: *around, live: live.take(), record: record.take(), lost: 0, carries: [0; 12] }
         };
         let work = uppers.into_iter().map(take).collect();
         Step { marks, place_of, work }
@@ -232,7 +277,7 @@ impl<'a> Step<'a> {
             (place != NO_MARKS).then(|| &self.marks[place as usize])
         };
         self.work.par_iter_mut().with_min_len(GRAIN).for_each(|work| {
-            let high = Axis::ALL.map(|axis| marks_of(work.brick.around[Face::new(axis, true).index()]));
+            let high = Axis::ALL.map(|axis| marks_of(work.around[Face::new(axis, true).index()]));
             work.choose(marks_of(work.place), high);
         });
         // The marks are done with: now the table says where the carries of a brick are.
@@ -240,96 +285,102 @@ impl<'a> Step<'a> {
         let carries: Vec<[u64; 12]> = self.work.iter().map(|work| work.carries).collect();
         (0..).zip(&self.work).for_each(|(i, work)| self.place_of[work.place as usize] = i);
         let place_of = &*self.place_of;
-        let changes: Vec<u8> = self
-            .work
-            .par_iter_mut()
-            .with_min_len(GRAIN)
-            .map(|work| {
-                let carried = |axis: Axis| {
-                    let low = work.brick.around[Face::new(axis, false).index()];
-                    let place = if low < DEEP { place_of[low as usize] } else { NO_MARKS };
-                    (place != NO_MARKS).then(|| &carries[place as usize])
-                };
-                let carried = Axis::ALL.map(carried);
-                work.finish(carried)
-            })
-            .collect();
+        self.work.par_iter_mut().with_min_len(GRAIN).for_each(|work| {
+            let carried = |axis: Axis| {
+                let low = work.around[Face::new(axis, false).index()];
+                let place = if low < DEEP { place_of[low as usize] } else { NO_MARKS };
+                (place != NO_MARKS).then(|| &carries[place as usize])
+            };
+            work.finish(Axis::ALL.map(carried));
+        });
         self.work.iter().for_each(|work| self.place_of[work.place as usize] = NO_MARKS);
         active.clear();
-        let places: Vec<u32> = self.work.iter().map(|work| work.place).collect();
+        let losses: Vec<(u32, u8)> =
+            self.work.iter().map(|work| (work.place, work.lost)).filter(|l| l.1 != 0).collect();
         for work in self.work {
-            let Brick { live, record, .. } = work.brick;
             let brick = &mut complex.bricks[work.place as usize];
-            (brick.live, brick.record) = (live.filter(|planes| planes.iter().any(|p| !p.is_empty())), record);
+            (brick.live, brick.record) = (work.live, work.record);
         }
-        for (place, change) in places.into_iter().zip(changes).filter(|(_, change)| *change != 0) {
-            active.push(place);
-            for axis in Axis::ALL {
-                if change >> axis.index() & 1 == 1 {
-                    active.extend(complex.open(place, Face::new(axis, true)));
-                }
+        active.extend(losses.iter().map(|loss| loss.0));
+        let mut beside = Vec::new();
+        for (place, lost) in losses {
+            for axis in Axis::ALL.into_iter().filter(|axis| lost >> axis.index() & 1 == 1) {
+                beside.extend(complex.open(place, Face::new(axis, true)));
             }
         }
+        beside.sort_unstable();
+        active.extend(beside);
     }
 }
 
 impl Work {
     /// Lets the elements of the brick choose among the marks in their boundary: its own, and those of the high neighbours.
-    fn choose(&mut self, own: Option<&Marks>, high: [Option<&Marks>; 3]) {
-        let Some(live) = self.brick.live.as_deref_mut() else { return };
-        let kinds_of = |marks: Option<&Marks>| marks.map_or(0, |marks| marks.kinds);
-        let own_kinds = kinds_of(own);
-        let plane = |marks: Option<&Marks>, extent: Extent| marks.map_or(Plane::EMPTY, |m| m.planes[extent.index()]);
+    fn choose<'a>(&mut self, own: Option<&'a Marks>, high: [Option<&'a Marks>; 3]) {
+        let Some(live) = self.live.as_deref_mut() else { return };
         for ((extent, axis), carry) in PAIRS.into_iter().zip(&mut self.carries) {
-            let next = high[axis.index()];
-            if (own_kinds | kinds_of(next)) >> extent.index() & 1 == 0 {
+            let plane = |marks: Option<&'a Marks>| marks.and_then(|marks| marks.plane(extent));
+            let (marked, next) = match (plane(own), plane(high[axis.index()])) {
+                (None, None) => continue,
+                (marked, next) => (marked.unwrap_or(&Plane::EMPTY), next.unwrap_or(&Plane::EMPTY)),
+            };
+            let (lower, upper) = (extent.index(), (extent | axis).index());
+            let (mut low, mut high) = (Plane::EMPTY, Plane::EMPTY);
+            for x in 0..8 {
+                let here = marked.0[x];
+                let further = match axis {
+                    Axis::X => {
+                        if x == 7 {
+                            next.0[0]
+                        } else {
+                            marked.0[x + 1]
+                        }
+                    }
+                    Axis::Y => here >> 8 | next.0[x] << 56,
+                    Axis::Z => here >> 1 & !(Z0 << 7) | (next.0[x] & Z0) << 7,
+                };
+                low.0[x] = here & live[upper].0[x];
+                high.0[x] = further & live[upper].0[x] & !here;
+            }
+            let both = low | high;
+            if both.is_empty() {
                 continue;
             }
-            let (lower, upper) = (extent.index(), (extent | axis).index());
-            let marked = plane(own, extent);
-            let low = marked & live[upper];
-            if !low.is_empty() {
-                live[lower] &= !low;
-                live[upper] &= !low;
-            }
-            let high = marked.at_plus(axis, &plane(next, extent)) & live[upper];
-            if !high.is_empty() {
-                live[lower] &= !high.at_minus(axis, &Plane::EMPTY);
-                live[upper] &= !high;
-                *carry = high.high_layer(axis);
-            }
+            live[lower] &= !(low | high.at_minus(axis, &Plane::EMPTY));
+            live[upper] &= !both;
+            *carry = high.high_layer(axis);
+            self.lost |= lost(&both, extent | axis);
             if extent.dimension() > 0 {
-                let record = self.brick.record.get_or_insert_with(|| Box::new(Record::NONE));
-                record.note(extent, axis, low, high);
+                self.record.get_or_insert_with(|| Box::new(Record::NONE)).note(extent, axis, &low, &high);
             }
         }
     }
 
-    /// Takes away what the low neighbours chose here. Whether the brick has lost anything (bit 3), and for each axis (bits 0 to 2) whether
-    /// something of that lies in the high layer and extends along it.
-    fn finish(&mut self, carried: [Option<&[u64; 12]>; 3]) -> u8 {
-        let Some(live) = self.brick.live.as_deref_mut() else { return 0 };
+    /// Takes away what the low neighbours chose here.
+    fn finish(&mut self, carried: [Option<&[u64; 12]>; 3]) {
+        let Some(live) = self.live.as_deref_mut() else { return };
         for (i, (extent, axis)) in PAIRS.into_iter().enumerate() {
             let layer = carried[axis.index()].map_or(0, |carries| carries[i]);
             if layer != 0 {
-                live[extent.index()] &= !Plane::from_low_layer(axis, layer);
+                let plane = Plane::from_low_layer(axis, layer);
+                live[extent.index()] &= !plane;
+                self.lost |= lost(&plane, extent);
             }
         }
-        let lost: Planes = std::array::from_fn(|extent| live[extent] ^ self.before[extent]);
-        let along = Axis::ALL.map(|axis| {
-            let with = Extent::ALL.into_iter().filter(|extent| extent.contains(axis));
-            with.fold(Plane::EMPTY, |all, extent| all | lost[extent.index()])
-        });
-        let touches = Axis::ALL.map(|axis| u8::from(along[axis.index()].touches_max(axis)) << axis.index());
-        let lost = along.iter().fold(lost[0], |all, plane| all | *plane);
-        touches.iter().fold(u8::from(!lost.is_empty()) << 3, |all, bit| all | bit)
+        if self.lost != 0 && live.iter().all(Plane::is_empty) {
+            self.live = None;
+        }
     }
+}
+
+/// The bits of [`Work::lost`] for elements of an extent.
+fn lost(plane: &Plane, extent: Extent) -> u8 {
+    extent.axes().fold(1 << 3, |all, axis| all | u8::from(plane.touches_max(axis)) << axis.index())
 }
 
 impl Record {
     /// Notes that the elements one dimension above `extent`, along `axis`, were removed with their low and high parts.
-    fn note(&mut self, extent: Extent, axis: Axis, low: Plane, high: Plane) {
-        let both = low | high;
+    fn note(&mut self, extent: Extent, axis: Axis, low: &Plane, high: &Plane) {
+        let both = *low | *high;
         if extent.dimension() == 2 {
             let number = axis.index() + 1;
             for (bit, plane) in self.cells[..2].iter_mut().enumerate() {
@@ -337,7 +388,7 @@ impl Record {
                     *plane |= both;
                 }
             }
-            self.cells[2] |= high;
+            self.cells[2] |= *high;
         } else {
             let normal = (extent | axis).complement().axes().next().expect("a face has a normal");
             let [paired, second, is_high] = &mut self.faces[normal.index()];
@@ -345,7 +396,7 @@ impl Record {
             if normal.others()[1] == axis {
                 *second |= both;
             }
-            *is_high |= high;
+            *is_high |= *high;
         }
     }
 }

@@ -65,7 +65,13 @@ fn look_at_octree(path: &Path, is_json: bool) -> Result<Option<String>> {
     table.line("crossed edges", &[Some(units::count(file.octree.crossings().len() as u64))]);
     table.line("volume", &[Some(real(file.octree.volume() * frame.cell_size().powi(3)))]);
     table.line("size of the file", &[Some(units::bytes(info.bytes))]);
-    let (corner, side, cell) = (vector(frame.origin()), real(frame.size()), real(frame.cell_size()));
+    // The file's cube may be the one in the middle of the grid.
+    let (corner, side) = if info.is_padded {
+        (frame.origin() + 0.25 * frame.size(), 0.25 * frame.size())
+    } else {
+        (frame.origin(), frame.size())
+    };
+    let (corner, side, cell) = (vector(corner), real(side), real(frame.cell_size()));
     let _ = writeln!(text, "{table}  a cube of side {side} at {corner}, with cells of {cell}");
     if info.trailing_bytes > 0 {
         let ignored = units::counted(info.trailing_bytes, "byte", "bytes");

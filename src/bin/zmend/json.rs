@@ -72,6 +72,7 @@ pub(crate) fn octree_file(info: &OctreeInfo) -> Value {
         "empty_cells": info.empty_cells,
         "missing_samples": info.missing_samples,
         "trailing_bytes": info.trailing_bytes,
+        "padded": info.is_padded,
     })
 }
 

@@ -5,17 +5,19 @@ mod bars;
 mod compare;
 mod digits;
 mod goal;
+mod handles;
 mod info;
 mod interrupt;
 mod json;
 mod measure;
 mod memory;
-mod octree;
 mod print;
 mod render;
 mod repair;
 mod sample;
+mod solid;
 mod summary;
+mod topology;
 mod units;
 
 use args::{Args, Command};
@@ -44,6 +46,7 @@ fn run(args: &Args) -> Result<ExitCode> {
     pool.build_global().map_err(|e| Error::setting("threads", e.to_string(), "take fewer"))?;
     match &args.command {
         Command::Repair(args) => repair::run(args),
+        Command::Topology(args) => topology::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Sample(args) => sample::run(args),

@@ -1,11 +1,12 @@
 //! `zmend repair`: the main job.
 
-use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg};
+use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
+use crate::solid::{self, Job};
 use crate::summary::Summary;
-use crate::{digits, goal, interrupt, memory, octree};
+use crate::{digits, goal, interrupt, memory};
 use glam::DVec3;
 use std::iter;
 use std::path::Path;
@@ -14,20 +15,23 @@ use std::time::Instant;
 use zmend::io::{self, Format, Input, OctreeFormat, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
-use zmend::{Faces, Options, Result, repair_into};
+use zmend::{Faces, Options, Result, repair_into, topology};
 
 /// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
 const SMALL: u64 = 1_000_000;
 
-pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
-    let goal = args.goal();
+pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
+    let RepairArgs { input, work: args, .. } = repair;
+    let goal = repair.goal();
     let format = goal::format(goal, args.write.format.map(Into::into))?;
-    goal::check(goal, &[&args.input], args.write.force)?;
-    let from = OctreeFormat::of_file(&args.input)?;
-    let (None, GoalFormat::Mesh(format)) = (from, format) else {
-        return octree::run(args, from, format);
+    goal::check(goal, &[input], args.write.force)?;
+    let topology = args.handles.options();
+    let (None, GoalFormat::Mesh(format)) = (OctreeFormat::of_file(input)?, format) else {
+        let (surface, skeleton, patches) = (SurfaceArg::Mc, None, None);
+        let job = Job { input, goal, to: format, work: args, topology, surface, skeleton, patches };
+        return solid::run(&job).map(|()| ExitCode::SUCCESS);
     };
-    let mut options = options(args);
+    let mut options = Options { topology, ..options(args, SurfaceArg::Mc) };
     if format.has_only_triangles() {
         // The surface knows better than the writer which diagonals to take.
         options.faces = Faces::Triangles;
@@ -36,15 +40,15 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     let bars = Bars::new(!args.tell.quiet && !args.tell.json);
     let start = Instant::now();
     bars.begin(Stage::Read, 0);
-    let mut input = Bounded::open(&args.input)?;
+    let mut source = Bounded::open(input)?;
     let is_text = args.write.ascii;
-    let (precision, loses_digits) = digits::choose(&input.bounds, &options, format, is_text)?;
+    let (precision, loses_digits) = digits::choose(&source.bounds, &options, format, is_text)?;
     let read = start.elapsed();
     let write_options = WriteOptions { precision, is_text, ..WriteOptions::default() };
     options.max_memory = memory::limit(args.grid.max_memory)?;
     let (report, repaired, bytes) = interrupt::noted(|| {
         let mut writer = io::create(goal, format, write_options)?;
-        let report = repair_into(&mut input, &options, &mut writer, &bars)?;
+        let report = repair_into(&mut source, &options, &mut writer, &bars)?;
         let repaired = start.elapsed();
         bars.begin(Stage::Write, 0);
         Ok((report, repaired, writer.finish()?))
@@ -57,7 +61,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     // Before anything is measured, which takes memory of its own.
     let peak_memory = memory::peak();
     bars.start("measure", 0);
-    let before = before(&input.input, args.tell.report)?;
+    let before = before(&source.input, args.tell.report)?;
     let after = after(report.sizes, report.volume, goal, bytes, args.tell.report)?;
     drop(bars);
     // The reading was done before the repair asked for it.
@@ -68,7 +72,7 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
         .collect();
     let summary = Summary {
         ignored: ignored(args, format),
-        input: input.input.info(),
+        input: source.input.info(),
         before,
         goal,
         format,
@@ -84,8 +88,8 @@ pub(crate) fn run(args: &RepairArgs) -> Result<ExitCode> {
     told.map(|()| ExitCode::SUCCESS)
 }
 
-/// What is asked for.
-pub(crate) fn options(args: &RepairArgs) -> Options {
+/// What is asked for, but for topology; with this surface if none is.
+pub(crate) fn options(args: &WorkArgs, surface: SurfaceArg) -> Options {
     Options {
         depth: args.grid.depth,
         cell: args.grid.cell,
@@ -97,15 +101,16 @@ pub(crate) fn options(args: &RepairArgs) -> Options {
         thicken_what: args.inside.thicken_what.into(),
         keep: args.inside.keep,
         drop_cavities: args.inside.drop_cavities,
-        surface: args.surface.kind.into(),
+        surface: args.surface.kind_or(surface).into(),
         faces: args.surface.faces.into(),
         no_self_intersections: args.surface.no_self_intersections,
         max_memory: None,
+        topology: topology::Options::default(),
     }
 }
 
 /// What was asked for and makes no difference.
-fn ignored(args: &RepairArgs, format: Format) -> Vec<String> {
+fn ignored(args: &WorkArgs, format: Format) -> Vec<String> {
     let mut ignored = Vec::new();
     if args.write.ascii && !matches!(format, Format::Stl | Format::Ply) {
         ignored.push(format!("--ascii makes no difference: {format} is always text"));
@@ -113,7 +118,7 @@ fn ignored(args: &RepairArgs, format: Format) -> Vec<String> {
     if args.surface.faces == FacesArg::Polygons {
         if format == Format::Stl {
             ignored.push("--faces polygons makes no difference: STL has nothing but triangles".to_owned());
-        } else if args.surface.kind == SurfaceArg::Mc {
+        } else if args.surface.kind_or(SurfaceArg::Mc) == SurfaceArg::Mc {
             ignored.push("--faces polygons makes no difference: marching cubes makes triangles".to_owned());
         }
     }

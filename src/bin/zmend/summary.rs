@@ -2,7 +2,7 @@
 
 use crate::measure::Side;
 use crate::print::{self, Table};
-use crate::{json, units};
+use crate::{handles, json, units};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::Duration;
@@ -48,6 +48,10 @@ impl Summary<'_> {
         let choice = &self.report.inside;
         print::out(&format!("inside by {}: {}\n", inside_name(choice.rule), choice.reason))?;
         self.dropped().map_or(Ok(()), |dropped| print::out(&format!("{dropped}\n")))?;
+        if let Some(report) = &self.report.topology {
+            let frame = &self.report.frame;
+            print::out(&handles::report_text(report, frame, frame.cell_size(), self.options.topology.measure))?;
+        }
         self.warnings().iter().for_each(print::warning);
         let seconds: Vec<String> =
             self.times.iter().map(|&(name, time)| format!("{name} {}", units::time(time.as_secs_f64()))).collect();
@@ -114,6 +118,9 @@ impl Summary<'_> {
                 "vanished_edges": self.report.vanished,
             },
             "components": self.components(),
+            "topology": self.report.topology.as_ref().map(|report| {
+                handles::report_json(report, frame, frame.cell_size(), self.options.topology.measure)
+            }),
             "octree": {
                 "crossings": self.report.crossings,
                 "bricks": self.report.bricks,

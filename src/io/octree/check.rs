@@ -50,11 +50,12 @@ impl Decoded {
         if let Ok(i) = self.bricks.binary_search_by_key(&key, |brick| brick.key) {
             return Signs::Divided(&self.bricks[i]);
         }
-        Signs::Uniform(self.uniform_around(key).expect("the octree covers its cube"))
+        // What the file does not cover is outside.
+        Signs::Uniform(self.uniform_around(key).unwrap_or(false))
     }
 
     /// The sign of the cell of one sign that is or holds `cell`.
-    fn uniform_around(&self, cell: Key) -> Option<bool> {
+    pub(super) fn uniform_around(&self, cell: Key) -> Option<bool> {
         // Cells of an octree are in order; one that holds `cell` may come just before or just after it.
         let i = self.uniform.partition_point(|&(key, _)| key < cell);
         let near = self.uniform[i.saturating_sub(1)..].iter().take(2);
@@ -68,22 +69,7 @@ impl Decoded {
             Signs::Uniform(is_inside) => plane_of(is_inside),
             Signs::Beyond => Plane::EMPTY,
         };
-        let c0 = brick.corners[0];
-        let [z, y, x] = [[0, 0, 1], [0, 1, 0], [1, 0, 0]].map(own);
-        let [yz, xz, xy, xyz] = [[0, 1, 1], [1, 0, 1], [1, 1, 0], [1, 1, 1]].map(own);
-        // At +z first, and then the others of what is there.
-        let (c1, y1) = (c0.at_plus_z(&z), y.at_plus_z(&yz));
-        let (x1, xy1) = (x.at_plus_z(&xz), xy.at_plus_z(&xyz));
-        let expected = [
-            c0,
-            c1,
-            c0.at_plus_y(&y),
-            c1.at_plus_y(&y1),
-            c0.at_plus_x(&x),
-            c1.at_plus_x(&x1),
-            c0.at_plus_y(&y).at_plus_x(&x.at_plus_y(&xy)),
-            c1.at_plus_y(&y1).at_plus_x(&x1.at_plus_y(&xy1)),
-        ];
+        let expected = corners_of(brick.corners[0], own);
         let differs = |corner: Corner| (brick.corners[corner.index()] ^ expected[corner.index()]).iter().next();
         let (corner, cell) = Corner::ALL.into_iter().find_map(|corner| Some((corner, differs(corner)?)))?;
         Some(self.at(brick.key, cell, corner))
@@ -134,7 +120,26 @@ impl Decoded {
     }
 }
 
-fn plane_of(is_inside: bool) -> Plane {
+/// For each corner, the cells of a brick whose corner is inside, from its own points and those of the bricks some steps on.
+pub(super) fn corners_of(c0: Plane, own: impl Fn([i32; 3]) -> Plane) -> [Plane; 8] {
+    let [z, y, x] = [[0, 0, 1], [0, 1, 0], [1, 0, 0]].map(&own);
+    let [yz, xz, xy, xyz] = [[0, 1, 1], [1, 0, 1], [1, 1, 0], [1, 1, 1]].map(&own);
+    // At +z first, and then the others of what is there.
+    let (c1, y1) = (c0.at_plus_z(&z), y.at_plus_z(&yz));
+    let (x1, xy1) = (x.at_plus_z(&xz), xy.at_plus_z(&xyz));
+    [
+        c0,
+        c1,
+        c0.at_plus_y(&y),
+        c1.at_plus_y(&y1),
+        c0.at_plus_x(&x),
+        c1.at_plus_x(&x1),
+        c0.at_plus_y(&y).at_plus_x(&x.at_plus_y(&xy)),
+        c1.at_plus_y(&y1).at_plus_x(&x1.at_plus_y(&xy1)),
+    ]
+}
+
+pub(super) fn plane_of(is_inside: bool) -> Plane {
     if is_inside { Plane::FULL } else { Plane::EMPTY }
 }
 

@@ -7,6 +7,7 @@
 //! Memory: 520 bytes a brick that is not of one sign, 16 bytes an empty node of at least 8 cells a side.
 
 use super::OctreeInfo;
+use super::coarse::MOST_CELLS;
 use super::dialect::{Dialect, Header, Node};
 use crate::error::Result;
 use crate::grid::brick::{Local, Plane};
@@ -32,6 +33,21 @@ pub(super) struct Decoded {
     pub(super) bricks: Vec<Divided>,
     /// Cells of one sign, of the size of a brick or larger, and whether they are inside, in order.
     pub(super) uniform: Vec<(Key, bool)>,
+    /// Surface cells above the finest level with corners of both signs, a bit for each that is inside.
+    pub(super) coarse: Vec<(Key, u8)>,
+    /// What is known of each brick, if not all are as the file has them.
+    pub(super) sources: Option<Vec<Source>>,
+}
+
+/// Where a brick comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// It is that number of the file's.
+    File(u32),
+    /// It holds cells that were divided.
+    Unknown,
+    /// It lies beside the file's cube.
+    Beside,
 }
 
 /// A brick with both signs.
@@ -66,14 +82,22 @@ pub(super) fn decode<D: Dialect, R: Read>(
     let depth = header.depth.max(LEAST_DEPTH);
     let root = Key::cell(depth - header.depth, [0; 3]).expect("the least corner of the grid");
     let mut decoder = Decoder::<D> {
-        made: Decoded { depth, cells: 1 << header.depth, bricks: Vec::new(), uniform: Vec::new() },
+        made: Decoded {
+            depth,
+            cells: 1 << header.depth,
+            bricks: Vec::new(),
+            uniform: Vec::new(),
+            coarse: Vec::new(),
+            sources: None,
+        },
         brick: None,
         leaves: Plane::EMPTY,
+        has_coarse: false,
         data: Box::new([D::Leaf::default(); 512]),
         keep,
     };
     let mut next = Some(root);
-    let mut nodes = 0u64;
+    let (mut nodes, mut coarse) = (0u64, 0u64);
     while let Some(cell) = next {
         nodes += 1;
         if nodes.is_multiple_of(OFTEN) {
@@ -97,18 +121,19 @@ pub(super) fn decode<D: Dialect, R: Read>(
                 match outside {
                     0 => info.surface_cells_inside += 1,
                     255 => info.surface_cells_outside += 1,
-                    _ if !is_finest => {
-                        let remedy = "write the octree with all surface cells at the finest level";
-                        return Err(
-                            bytes.error("a surface cell above the finest level has corners of both signs", remedy)
-                        );
-                    }
                     _ => {}
                 }
                 if is_finest {
                     decoder.leaf(cell, !outside, data);
-                } else {
+                } else if [0, 255].contains(&outside) {
                     decoder.empty(cell, outside == 0);
+                } else {
+                    coarse += 1 << (3 * (depth - cell.level().expect("cells have levels")));
+                    if coarse > MOST_CELLS {
+                        let problem = "surface cells above the finest level would be divided into too many";
+                        return Err(bytes.error(problem, "write the octree with surface cells at the finest level"));
+                    }
+                    decoder.coarse(cell, !outside);
                 }
                 after(cell, root)
             }
@@ -137,6 +162,8 @@ struct Decoder<'a, 'k, D: Dialect> {
     brick: Option<Divided>,
     /// Its leaves at the finest level.
     leaves: Plane,
+    /// Whether it holds cells that are to be divided.
+    has_coarse: bool,
     /// What they say; stale for other cells.
     data: Box<[D::Leaf; 512]>,
     keep: &'a mut Keep<'k, D::Leaf>,
@@ -157,6 +184,17 @@ impl<D: Dialect> Decoder<'_, '_, D> {
             let cube = Plane::cube(at, 1 << (depth - level));
             brick.corners.iter_mut().for_each(|plane| *plane |= cube);
         }
+    }
+
+    /// Takes a larger cell with corners of both signs; `inside` has a bit for each.
+    fn coarse(&mut self, cell: Key, inside: u8) {
+        if cell.level().expect("cells have levels") + 3 <= self.made.depth {
+            self.finish_brick();
+        } else {
+            self.brick_around(cell);
+            self.has_coarse = true;
+        }
+        self.made.coarse.push((cell, inside));
     }
 
     /// Takes a cell of the finest level; `inside` has a bit for each corner.
@@ -183,7 +221,11 @@ impl<D: Dialect> Decoder<'_, '_, D> {
     /// Puts down the brick that is being read, if there is any.
     fn finish_brick(&mut self) {
         let Some(brick) = self.brick.take() else { return };
-        if [Plane::EMPTY, Plane::FULL].contains(&brick.corners[0]) && brick.corners == [brick.corners[0]; 8] {
+        let has_coarse = std::mem::take(&mut self.has_coarse);
+        if !has_coarse
+            && [Plane::EMPTY, Plane::FULL].contains(&brick.corners[0])
+            && brick.corners == [brick.corners[0]; 8]
+        {
             self.made.uniform.push((brick.key, !brick.corners[0].is_empty()));
             return;
         }

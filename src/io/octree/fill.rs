@@ -2,17 +2,18 @@
 
 use super::dcf::Hermite;
 use super::decode::Divided;
+use super::pad::LEVELS;
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
-use crate::grid::Axis;
 use crate::grid::brick::{Local, Plane};
-use crate::octree::StoredPoints;
-use crate::octree::crossings::{Sample, lattice_point, toward};
+use crate::grid::{Axis, Edge, Extent};
+use crate::octree::crossings::{Sample, finest_element, lattice_point, toward};
 use crate::octree::segments::Segments;
+use crate::octree::{SignedOctree, StoredPoints};
 use glam::DVec3;
 
 /// A crossing of which nothing is known.
-pub(super) const HALF_WAY: Sample = Sample { offset: 1 << 15, normal: 0 };
+const HALF_WAY: Sample = Sample { offset: 1 << 15, normal: 0 };
 
 /// The samples of DCF, brick by brick: 4 bytes a crossing and 8 a brick.
 #[derive(Default)]
@@ -110,4 +111,60 @@ fn cut(axis: Axis, [a, b, c, d]: [DVec3; 4]) -> Sample {
     };
     // Numbers below 0 become 0.
     Sample::new((at * 65536.0) as u16, normal)
+}
+
+/// Pushes the samples of a brick of which nothing is known.
+pub(super) fn half_way(brick: &Divided, samples: &mut Vec<Sample>) {
+    for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
+        samples.extend(plane.iter().map(|_| Sample { normal: straight(axis), ..HALF_WAY }));
+    }
+}
+
+/// Pushes the samples of a brick beside the file's cube, which is so many cells wide in the middle of a larger one: the solid ends where the
+/// cube does. Of other crossings nothing is known.
+pub(super) fn at_sides(depth: u32, cells: u32, brick: &Divided, samples: &mut Vec<Sample>) {
+    let origin = lattice_point(depth, brick.key);
+    let side = 1 << (depth - LEVELS);
+    for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
+        for edge in plane.iter() {
+            let offset = match origin[axis.index()] + edge.coords()[axis.index()] {
+                start if start + 1 == side => u16::MAX,
+                start if start == side + cells => 0,
+                _ => HALF_WAY.offset,
+            };
+            samples.push(Sample::new(offset, straight(axis)));
+        }
+    }
+}
+
+/// Points for all mixed cells of an octree: those that are there, and for others the mean of the crossings of their edges.
+pub(super) fn completed(points: &StoredPoints, octree: &SignedOctree, frame: &Frame) -> StoredPoints {
+    let crossings = octree.crossings();
+    let mut all = StoredPoints::default();
+    for (i, brick) in crossings.bricks().iter().enumerate() {
+        let (mixed, stored) = (octree.mixed_cells(i), points.of_brick(brick.key));
+        if mixed.is_empty() {
+            continue;
+        }
+        let origin = crossings.origin(brick);
+        let mean = |cell: Local| {
+            let c = cell.coords();
+            let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+            for edge in Edge::ALL {
+                let (start, axis) = (edge.corners()[0], edge.axis());
+                let at = Axis::ALL.map(|a| origin[a.index()] + c[a.index()] + u32::from(start.is_high(a)));
+                let inside = at.iter().all(|&c| c >> crossings.depth() == 0);
+                let key = inside.then(|| finest_element(crossings.depth(), at, Extent::from(axis)));
+                if let Some(sample) = key.and_then(|key| crossings.sample(key)) {
+                    sum += DVec3::from(at.map(f64::from)) + DVec3::AXES[axis.index()] * sample.position();
+                    count += 1.0;
+                }
+            }
+            frame.to_model(sum / count).as_vec3().to_array()
+        };
+        let of_cell = |cell| stored.and_then(|stored| stored.get(cell)).unwrap_or_else(|| mean(cell));
+        let list: Vec<[f32; 3]> = mixed.iter().map(of_cell).collect();
+        all.push(brick.key, mixed, &list);
+    }
+    all
 }

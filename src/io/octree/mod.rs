@@ -18,9 +18,9 @@
 //! # Reading
 //!
 //! Every file that is read gives an octree that all of this library can work with, or an error: nodes of unknown type, cut files, cells
-//! that disagree on a lattice point that they share, and solids that touch the side of their cube are refused. Surface cells without a
-//! change of sign are taken as empty, at any level; those with one must be at the finest level. Grids of 1, 2 and 4 cells a side become
-//! the least corner of one of 8, with cells of the same size.
+//! that disagree on a lattice point that they share are refused. A solid that touches the side of its cube ends there, in a grid four times
+//! as wide (see `pad`). Surface cells without a change of sign are taken as empty, at any level; those with one that are not at the finest
+//! level are divided (see `coarse`). Grids of 1, 2 and 4 cells a side become the least corner of one of 8, with cells of the same size.
 //!
 //! What a file does not say of a crossing is filled in. SOF says nothing: crossings lie half way, and there are no normals. From the
 //! points of SOG, each crossing lies where its edge meets the plane that fits the points of its four cells best (its normal is the
@@ -28,11 +28,13 @@
 //! crossed half way, at a right angle. Writing what was read gives the same file again, if it came from here.
 
 mod check;
+mod coarse;
 mod dcf;
 mod decode;
 mod dialect;
 mod encode;
 mod fill;
+mod pad;
 mod read;
 mod sof;
 mod sog;
@@ -148,6 +150,8 @@ pub struct OctreeInfo {
     pub missing_samples: u64,
     /// Bytes behind the end of the octree, which were ignored.
     pub trailing_bytes: u64,
+    /// Whether the solid touches the side of its cube: then that is the one in the middle of a grid of four times as many cells a side.
+    pub is_padded: bool,
 }
 
 impl fmt::Display for OctreeInfo {

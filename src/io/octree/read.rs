@@ -2,9 +2,10 @@
 
 use super::check::Disagreement;
 use super::dcf::Dcf;
-use super::decode::{Decoded, Divided, Keep, decode};
+use super::decode::{Decoded, Divided, Keep, Source, decode};
 use super::dialect::{Dialect, Header};
 use super::fill::{self, Hermites};
+use super::pad::{LEVELS, shifted};
 use super::sof::Sof;
 use super::sog::Sog;
 use super::{OctreeFile, OctreeFormat, OctreeInfo};
@@ -26,8 +27,7 @@ use std::path::Path;
 /// Memory while reading: some 8 bytes a surface cell beyond what is returned.
 ///
 /// # Errors
-/// When the file cannot be read, is of no known format or malformed, holds signs that contradict each other or a solid that touches the
-/// side of its cube; and `Cancelled`.
+/// When the file cannot be read, is of no known format or malformed, or holds signs that contradict each other; and `Cancelled`.
 pub fn read_octree(path: impl AsRef<Path>, progress: &dyn Progress) -> Result<OctreeFile> {
     let path = path.as_ref();
     let io_error = |e| Error::io(path, "read", e);
@@ -75,6 +75,7 @@ fn read_from(
         empty_cells: 0,
         missing_samples: 0,
         trailing_bytes: 0,
+        is_padded: false,
     };
     let mut reading = Reading { name, bytes, info, progress };
     let (octree, frame, points) = match format {
@@ -100,11 +101,7 @@ type Parts = (SignedOctree, Frame, Option<StoredPoints>);
 impl<R: Read> Reading<'_, R> {
     fn sof(&mut self) -> Result<Parts> {
         let (frame, decoded) = self.decoded::<Sof>(&mut |_, _, _| {})?;
-        let half_way = |_, brick: &Divided, samples: &mut Vec<Sample>| {
-            let crossings = brick.crossed().iter().map(|plane| plane.count() as usize).sum();
-            samples.resize(crossings, fill::HALF_WAY);
-        };
-        Ok((self.octree(&decoded, false, half_way)?, frame, None))
+        Ok((self.octree(&decoded, false, |_, brick, samples| fill::half_way(brick, samples))?, frame, None))
     }
 
     fn sog(&mut self) -> Result<Parts> {
@@ -113,8 +110,14 @@ impl<R: Read> Reading<'_, R> {
             let points_of_brick: Vec<[f32; 3]> = leaves.iter().map(|cell| data[cell.index() as usize]).collect();
             points.push(brick.key, *leaves, &points_of_brick);
         })?;
+        if self.info.is_padded {
+            points = points.renamed(shifted);
+        }
         let octree =
             self.octree(&decoded, true, |_, brick, samples| fill::from_points(&points, &frame, brick, samples))?;
+        if decoded.sources.is_some() {
+            points = fill::completed(&points, &octree, &frame);
+        }
         Ok((octree, frame, Some(points)))
     }
 
@@ -122,26 +125,47 @@ impl<R: Read> Reading<'_, R> {
         let mut hermites = Hermites::default();
         let (frame, decoded) = self.decoded::<Dcf>(&mut |brick, leaves, data| hermites.push(brick, leaves, data))?;
         self.info.missing_samples = hermites.missing;
-        Ok((self.octree(&decoded, true, |i, _, samples| hermites.of_brick(i, samples))?, frame, None))
+        Ok((
+            self.octree(&decoded, true, |i, brick, samples| match i {
+                Some(i) => hermites.of_brick(i, samples),
+                None => fill::half_way(brick, samples),
+            })?,
+            frame,
+            None,
+        ))
     }
 
     /// Reads header and nodes, and makes sure that the signs make sense.
     fn decoded<D: Dialect>(&mut self, keep: &mut Keep<'_, D::Leaf>) -> Result<(Frame, Decoded)> {
         let header = D::read_header(&mut self.bytes)?;
         let frame = self.frame(header)?;
-        let decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;
-        let (problem, [x, y, z], remedy) = match decoded.disagreement() {
-            None => return Ok((frame, decoded)),
-            Some(Disagreement::Around(point)) => {
-                ("cells disagree whether their common corner is inside:", point, "the file is damaged: write it again")
-            }
-            Some(Disagreement::OnSide(point)) => {
-                let remedy = "write the octree again with a margin of at least one cell on all sides";
-                ("the solid touches the side of its cube", point, remedy)
-            }
+        let mut decoded = decode::<D, _>(&mut self.bytes, header, &mut self.info, keep, self.progress)?;
+        if let Some(point) = decoded.divide() {
+            return Err(self.disagreement(point));
+        }
+        let Some(found) = decoded.disagreement() else { return Ok((frame, decoded)) };
+        if let Disagreement::Around(point) = found {
+            return Err(self.disagreement(point));
+        }
+        // The solid touches the side of its cube.
+        let shift = 1 << decoded.depth;
+        let Some(decoded) = decoded.padded() else {
+            let problem = "the solid touches the side of its cube, and the grid is too fine for a larger one";
+            let remedy = "write the octree again with a margin of at least one cell on all sides";
+            return Err(Error::format(self.name, Place::Whole, problem, remedy));
         };
-        let problem = format!("{problem} at lattice point {x}, {y}, {z}");
-        Err(Error::format(self.name, Place::Whole, problem, remedy))
+        if let Some(Disagreement::Around(point) | Disagreement::OnSide(point)) = decoded.disagreement() {
+            return Err(self.disagreement(point.map(|c| c.saturating_sub(shift))));
+        }
+        self.info.is_padded = true;
+        let side = frame.size() * f64::from(1 << LEVELS);
+        let frame = Frame::new(frame.origin() - frame.size(), side, decoded.depth);
+        Ok((frame.map_err(|e| Error::format(self.name, Place::Whole, format!("a larger cube: {e}"), ""))?, decoded))
+    }
+
+    fn disagreement(&self, [x, y, z]: [u32; 3]) -> Error {
+        let problem = format!("cells disagree whether their common corner is inside: at lattice point {x}, {y}, {z}");
+        Error::format(self.name, Place::Whole, problem, "the file is damaged: write it again")
     }
 
     fn frame(&self, header: Header) -> Result<Frame> {
@@ -153,12 +177,13 @@ impl<R: Read> Reading<'_, R> {
         frame.map_err(|e| Error::format(self.name, Place::Whole, format!("the cube of the octree: {e}"), ""))
     }
 
-    /// Puts the octree together; `samples` pushes those of the crossings of brick number i, in order.
+    /// Puts the octree together; `samples` pushes those of the crossings of a brick, in order, given its number in the
+    /// file, unless cells in it were divided.
     fn octree(
         &self,
         decoded: &Decoded,
         with_normals: bool,
-        samples: impl Fn(usize, &Divided, &mut Vec<Sample>) + Sync,
+        samples: impl Fn(Option<usize>, &Divided, &mut Vec<Sample>) + Sync,
     ) -> Result<SignedOctree> {
         let crossings = |brick: &Divided| brick.crossed().iter().map(|plane| u64::from(plane.count())).sum::<u64>();
         if decoded.bricks.iter().map(crossings).sum::<u64>() > u64::from(u32::MAX) {
@@ -167,7 +192,18 @@ impl<R: Read> Reading<'_, R> {
         }
         let signs: Vec<(Key, Plane)> = decoded.bricks.iter().map(|brick| (brick.key, brick.corners[0])).collect();
         let is_inside = |brick| decoded.is_uniformly_inside(brick);
-        let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| samples(i, &decoded.bricks[i], list);
+        let cells = 1 << self.info.depth;
+        let samples = |i: usize, _: &[Plane; 3], list: &mut Vec<Sample>| {
+            let brick = &decoded.bricks[i];
+            match &decoded.sources {
+                None => samples(Some(i), brick, list),
+                Some(sources) => match sources[i] {
+                    Source::File(i) => samples(Some(i as usize), brick, list),
+                    Source::Unknown => samples(None, brick, list),
+                    Source::Beside => fill::at_sides(decoded.depth, cells, brick, list),
+                },
+            }
+        };
         Ok(SignedOctree::from_signs(decoded.depth, with_normals, &signs, is_inside, samples))
     }
 }

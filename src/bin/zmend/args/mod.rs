@@ -2,16 +2,19 @@
 
 mod compare;
 mod repair;
+mod topology;
 mod values;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg};
+pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
+pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
 
 use repair::GridArgs;
 
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, value_parser};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use values::{degrees, detail_range, size};
 
@@ -29,6 +32,7 @@ Examples:
   zmend sample knot-holes broken.ply          write a broken mesh to try
   zmend info broken.ply                       what is wrong with it
   zmend repair broken.ply fixed.ply           repair it
+  zmend topology fixed.ply clean.ply --cut 2  cut its thin handles
   zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
@@ -44,20 +48,32 @@ pub(crate) struct Args {
 
 /// What the command line says; ends the program when it makes no sense.
 pub(crate) fn parse() -> Args {
-    let matches = Args::command().get_matches();
+    let matches = Args::command().get_matches_from(words());
     let mut args = Args::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
-    if let (Command::Repair(args), Some((_, matches))) = (&mut args.command, matches.subcommand()) {
+    let work = match &mut args.command {
+        Command::Repair(args) => Some(&mut args.work),
+        Command::Topology(args) => Some(&mut args.work),
+        _ => None,
+    };
+    if let (Some(work), Some((_, matches))) = (work, matches.subcommand()) {
         let is_given = |id: &&str| {
             matches.ids().any(|known| known == id) && matches.value_source(id) == Some(ValueSource::CommandLine)
         };
-        args.grid.given = GridArgs::IDS.into_iter().find(is_given);
+        work.grid.given = GridArgs::IDS.into_iter().find(is_given);
     }
     args
+}
+
+/// The words of the command line; `-skt`, which `TopoMender` has, is `--skeleton`.
+fn words() -> impl Iterator<Item = OsString> {
+    let is_topology = std::env::args_os().nth(1).is_some_and(|word| word == "topology");
+    std::env::args_os().map(move |word| if is_topology && word == "-skt" { "--skeleton".into() } else { word })
 }
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Repair(RepairArgs),
+    Topology(TopologyArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Sample(SampleArgs),

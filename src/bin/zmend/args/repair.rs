@@ -1,5 +1,6 @@
 //! What `zmend repair` understands.
 
+use super::topology::HandleArgs;
 use super::values::{bytes, cell, coordinate, depth_range, keep, scale, width};
 use crate::goal::GoalFormat;
 use clap::{ArgGroup, ValueEnum};
@@ -29,6 +30,7 @@ Examples:
   zmend repair cad.stl shell.stl --inside hull --gap 0.5    the outer shell, gaps up to 0.5 units closed
   zmend repair leaf.obj leaf.stl --thicken 0.8        open sheets become walls 0.8 units thick
   zmend repair scan.ply body.ply --keep largest --drop-cavities    one solid and nothing within
+  zmend repair scan.ply body.ply --cut 0.5 --fill 2    thin handles cut, small holes filled: see `zmend help topology`
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
 Holes are closed, and so are gaps between faces that should touch."
@@ -44,6 +46,15 @@ pub(crate) struct RepairArgs {
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+/// What can be asked of everything that makes a solid and writes it.
+#[derive(Debug, clap::Args)]
+pub(crate) struct WorkArgs {
+    #[command(flatten)]
+    pub(crate) handles: HandleArgs,
     #[command(flatten)]
     pub(crate) grid: GridArgs,
     #[command(flatten)]
@@ -148,15 +159,22 @@ impl From<ThickenArg> for Thicken {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
-    /// Kind of surface.
-    #[arg(short = 's', long = "surface", value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc)]
-    pub(crate) kind: SurfaceArg,
+    /// Kind of surface. When not given: mc, or for `topology` of SOG files dc, with the points of the file.
+    #[arg(short = 's', long = "surface", value_name = "KIND", value_enum)]
+    kind: Option<SurfaceArg>,
     /// What the faces are: auto is polygons for quads and blocks, triangles for mc and dc.
     #[arg(long, value_name = "KIND", value_enum, default_value_t = FacesArg::Auto)]
     pub(crate) faces: FacesArg,
     /// No face passes through another one. Some faces of dc and quads are cut in four for that; mc and blocks need no change.
     #[arg(long)]
     pub(crate) no_self_intersections: bool,
+}
+
+impl SurfaceArgs {
+    /// The kind that was asked for, or another one.
+    pub(crate) fn kind_or(&self, other: SurfaceArg) -> SurfaceArg {
+        self.kind.unwrap_or(other)
+    }
 }
 
 /// How the result is written.
@@ -244,7 +262,7 @@ impl From<InsideArg> for zmend::Inside {
 /// Kinds of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SurfaceArg {
-    /// Marching cubes: triangles.
+    /// Marching cubes: triangles. Where handles are cut or tunnels filled, it is quads, in triangles.
     Mc,
     /// Dual contouring: keeps sharp edges and corners.
     Dc,

@@ -78,6 +78,12 @@ pub(super) fn width(text: &str) -> Result<f64, String> {
     if width > 0.0 && f64::is_finite(width) { Ok(width) } else { Err("not a width above 0".to_owned()) }
 }
 
+/// An area or a volume: a number from 0 on, or `all`.
+pub(super) fn amount(text: &str) -> Result<f64, String> {
+    let amount = if text == "all" { Ok(f64::INFINITY) } else { text.parse() };
+    amount.ok().filter(|amount| *amount >= 0.0).ok_or_else(|| "not a number from 0 on, `inf` or `all`".to_owned())
+}
+
 /// `all`, `largest`, a number of solids, or a ratio, which is written with a point.
 pub(super) fn keep(text: &str) -> Result<Keep, String> {
     let keep = match text {
@@ -136,6 +142,8 @@ mod tests {
         assert!(["0", "-1", "1.5", "nan", "most", ""].iter().all(|bad| keep(bad).is_err()));
         assert_eq!(width("2.5"), Ok(2.5));
         assert!(["0", "-1", "nan", "inf", "x"].iter().all(|bad| width(bad).is_err()));
+        assert_eq!(["0", "2.5", "inf", "all"].map(amount), [Ok(0.0), Ok(2.5), Ok(f64::INFINITY), Ok(f64::INFINITY)]);
+        assert!(["-1", "nan", "-inf", "some"].iter().all(|bad| amount(bad).is_err()));
         assert!(degrees("-45.5").is_ok() && degrees("nan").is_err() && degrees("north").is_err());
     }
 }
