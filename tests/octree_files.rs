@@ -386,6 +386,9 @@ fn nodes(at: [u32; 3], side: u32, is_sog: bool, inside: &dyn Fn([u32; 3]) -> boo
     }
 }
 
+/// Whether a lattice point is inside.
+type Inside<'a> = &'a dyn Fn([u32; 3]) -> bool;
+
 /// An octree file of signs at the (cells + 1)^3 points of a grid.
 fn file_of(cells: u32, is_sog: bool, inside: &dyn Fn([u32; 3]) -> bool) -> OctreeFile {
     let mut bytes = Vec::new();
@@ -406,7 +409,7 @@ fn solids_that_touch_the_side_of_their_cube_end_there() {
             let n = p.iter().fold(u64::from(cells), |n, &c| (n ^ u64::from(c)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
             n >> 40 & 1 == 1
         };
-        let solids: [(&str, &dyn Fn([u32; 3]) -> bool); 5] = [
+        let solids: [(&str, Inside<'_>); 5] = [
             ("full", &|_| true),
             ("slab", &|p| p[2] < cells / 2),
             ("high", &|p| p[0] > cells / 2 && p[1] > 0),

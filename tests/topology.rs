@@ -414,7 +414,7 @@ fn what_makes_no_sense_is_refused() {
         ("topology ring.sof 1 1 out.ply --cut 2", "sizes already"),
         ("topology ring.sof out.ply --list", "nothing is written"),
         ("topology ring.sof out.ply --cut -1", "not a number from 0 on"),
-        ("topology ring.sof out.ply --depth 7", "a grid of its own"),
+        ("topology ring.sof out.ply --cut 1 --depth 7", "a grid of its own"),
         ("topology ring.sof ring.sof --cut 1 --force", "replace the input"),
         ("topology ring.sof out.ply --cut 1 --skeleton bones.stl", ".skt"),
         ("topology ring.sof out.ply --cut 1 --patches discs.skt", ".obj"),
