@@ -87,9 +87,8 @@ pub(super) fn tell(
     if boundary.is_empty() {
         return without_boundary(scan, inside, clock, progress);
     }
-    if inside == Inside::Auto {
-        // Winding numbers of open surfaces leave specks at their rims now and then; closing holes does not.
-        let reason = reason_of(&boundary);
+    let reason = if inside == Inside::Auto { reason_of(&boundary) } else { Reason::Asked };
+    if matches!(reason, Reason::Turned | Reason::OpenAndTurned) {
         return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, reason, clock, progress);
     }
     let odd_faces = boundary.iter().filter(|c| is_rim(c)).count() as u64;
@@ -101,7 +100,7 @@ pub(super) fn tell(
     let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.hits().len() as u64, vanished: 0 };
     let winding = clock.time(Stage::Sign, || winding_signs(&scan.hits, &patches, progress))?;
     let vanished = vanished(&scan.hits, &winding.octree);
-    let choice = InsideChoice { rule: Inside::Winding, reason: Reason::Asked, reversed: patches.reversed() };
+    let choice = InsideChoice { rule: Inside::Winding, reason, reversed: patches.reversed() };
     Ok(Told { octree: winding.octree, counts: scan.counts, closing, choice, clipped: winding.clipped, vanished })
 }
 

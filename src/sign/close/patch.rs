@@ -27,8 +27,6 @@ pub(crate) struct Switch {
     pub(crate) edge: Key,
     /// Where the patch goes through.
     pub(crate) sample: Sample,
-    /// With rings that run round the boundary as it is oriented: whether the winding number rises along the edge's axis.
-    pub(crate) rises: bool,
 }
 
 impl<'a> Patch<'a> {
@@ -95,7 +93,6 @@ impl<'a> Patch<'a> {
         let delta = [to[0] - from[0], to[1] - from[1]];
         let mut square = [b.cell[u], b.cell[v]];
         let goal = [a.cell[u], a.cell[v]];
-        let upward = b.cell[plane.axis.index()] < plane.at;
         let mut line = Vec::new();
         while square != goal {
             // Part of the way after which the line leaves the square, for each direction in which it still has to go.
@@ -135,10 +132,7 @@ impl<'a> Patch<'a> {
             let edge_at = edge_in(d);
             let mut at = DVec3::from(edge_at.map(f64::from));
             at[[u, v][other]] = along;
-            // The ring goes up through the square at b, say. Circulation round that square must be taken away by the edge ahead, which runs
-            // one way round it; the next square has it on the other side, and so it goes on until the ring comes down at a.
-            let ahead_is_positive = (d == 0) == up;
-            self.switch(edge_at, plane, d, along - f64::from(square[other]), upward != ahead_is_positive);
+            self.switch(edge_at, plane, d, along - f64::from(square[other]));
             let mut next = square;
             next[d] = if up { square[d] + 1 } else { square[d] - 1 };
             line.push(Crossing { from: square, to: next, at });
@@ -152,7 +146,7 @@ impl<'a> Patch<'a> {
     }
 
     /// Switches the edge in the plane that a step in direction `d` crosses.
-    fn switch(&mut self, at: [u32; 3], plane: Plane, d: usize, position: f64, rises: bool) {
+    fn switch(&mut self, at: [u32; 3], plane: Plane, d: usize, position: f64) {
         let axis = plane.axis.others()[1 - d];
         let edge = self.edge(at, axis);
         // Where the line runs askew, it crosses edges in the plane of the hole itself: any slope will do there.
@@ -164,7 +158,7 @@ impl<'a> Patch<'a> {
         }
         let normal = NormalCode::encode(axis, normal.to_array());
         let sample = Sample::new((position * 65536.0) as u16, normal.0);
-        self.switches.push(Switch { edge, sample, rises });
+        self.switches.push(Switch { edge, sample });
     }
 }
 
