@@ -1,6 +1,8 @@
 //! The main job on every real mesh there is: whatever can be read is repaired to closed, manifold, oriented surfaces.
 //!
-//! `ZMEND_SWEEP_DEPTHS="6,7,8,9" cargo test --test pipeline -- --nocapture` sweeps at other depths than 6 and 7.
+//! `ZMEND_SWEEP_DEPTHS="6,7,8,9" ZMEND_SWEEP_RULES="auto,parity,winding,hull" cargo test --release --test pipeline -- --nocapture` sweeps
+//! at other depths than 6 and 7, and by other rules of inside than `auto`. With `ZMEND_SWEEP_INTERSECTIONS=1` it looks for
+//! self-intersections where there must be none, too.
 
 mod common;
 
@@ -8,7 +10,7 @@ use common::{Topology, check_repaired, data, files, name, surfaces};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use zmend::{Mesh, io, repair};
+use zmend::{Inside, Mesh, Options, Surface, io, repair};
 
 /// What came of one file.
 #[derive(Default)]
@@ -25,20 +27,40 @@ fn depths() -> Vec<u32> {
     list.split(',').map(|d| d.trim().parse().expect("ZMEND_SWEEP_DEPTHS lists depths: 6,7,8")).collect()
 }
 
-fn sweep(path: &Path, depths: &[u32]) -> Outcome {
+fn rules() -> Vec<Inside> {
+    let list = std::env::var("ZMEND_SWEEP_RULES").unwrap_or_else(|_| "auto".to_owned());
+    let rule = |name: &str| match name.trim() {
+        "auto" => Inside::Auto,
+        "parity" => Inside::Parity,
+        "winding" => Inside::Winding,
+        "hull" => Inside::Hull,
+        other => panic!("ZMEND_SWEEP_RULES lists rules: auto,parity,winding,hull; not {other}"),
+    };
+    list.split(',').map(rule).collect()
+}
+
+fn looks_for_intersections() -> bool {
+    std::env::var_os("ZMEND_SWEEP_INTERSECTIONS").is_some()
+}
+
+fn sweep(path: &Path, depths: &[u32], rules: &[Inside]) -> Outcome {
     let start = Instant::now();
     let mut outcome = Outcome::default();
     match io::read(path) {
         Err(error) => outcome.refused = Some(error.to_string()),
-        Ok(mesh) => depths.iter().for_each(|&depth| sweep_mesh(&name(path), &mesh, depth, &mut outcome)),
+        Ok(mesh) => depths.iter().for_each(|&depth| {
+            rules.iter().for_each(|&inside| sweep_mesh(&name(path), &mesh, depth, inside, &mut outcome));
+        }),
     }
     outcome.took = start.elapsed();
     outcome
 }
 
-fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, outcome: &mut Outcome) {
+fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, inside: Inside, outcome: &mut Outcome) {
     let mut first: Option<Topology> = None;
     for (mode, options) in surfaces(depth) {
+        let mode = format!("{mode} by {inside:?}");
+        let options = Options { inside, ..options };
         let repaired = match repair(mesh.clone(), &options) {
             Ok(repaired) => repaired,
             Err(error) => {
@@ -55,6 +77,12 @@ fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, outcome: &mut Outcome) {
             }
             Err(problem) => outcome.failures.push(format!("{name} depth {depth} {mode}: {problem}")),
         }
+        if looks_for_intersections() && (options.surface == Surface::MarchingCubes || options.no_self_intersections) {
+            let pairs = repaired.mesh.self_intersections().len();
+            if pairs > 0 {
+                outcome.failures.push(format!("{name} depth {depth} {mode}: {pairs} pairs of faces meet"));
+            }
+        }
     }
 }
 
@@ -69,16 +97,25 @@ const NOT_MESHES: &[&str] = &[
 
 #[test]
 fn every_mesh_is_repaired() {
+    sweep_all(&depths(), &rules());
+}
+
+/// By every rule of inside, in every mode.
+#[test]
+fn every_mesh_is_repaired_by_every_rule() {
+    sweep_all(&[5], &[Inside::Parity, Inside::Winding, Inside::Hull]);
+}
+
+fn sweep_all(depths: &[u32], rules: &[Inside]) {
     let Some(data) = data() else { return };
-    let depths = depths();
     let files = files(&data);
     let start = Instant::now();
-    let outcomes: Vec<Outcome> = files.par_iter().map(|path| sweep(path, &depths)).collect();
+    let outcomes: Vec<Outcome> = files.par_iter().map(|path| sweep(path, depths, rules)).collect();
     let sum = |count: fn(&Outcome) -> usize| outcomes.iter().map(count).sum::<usize>();
     let refused: Vec<String> =
         files.iter().zip(&outcomes).filter(|(_, o)| o.refused.is_some()).map(|(path, _)| name(path)).collect();
     println!(
-        "sweep: {} files, {} repairs at depths {depths:?} in {} modes, {} of them empty; {} files refused; {:.1} s",
+        "sweep: {} files, {} repairs at depths {depths:?} by {rules:?} in {} modes, {} of them empty; {} files refused; {:.1} s",
         files.len(),
         sum(|o| o.repairs),
         surfaces(3).len(),
@@ -101,5 +138,5 @@ fn every_mesh_is_repaired() {
     let failures: Vec<&String> = outcomes.iter().flat_map(|o| &o.failures).collect();
     assert!(failures.is_empty(), "{} failures:\n{failures:#?}", failures.len());
     assert_eq!(refused, NOT_MESHES);
-    assert!(sum(|o| o.repairs) >= 100 * depths.len() * surfaces(3).len(), "the data are all there");
+    assert!(sum(|o| o.repairs) >= 100 * depths.len() * rules.len() * surfaces(3).len(), "the data are all there");
 }
