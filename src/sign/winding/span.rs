@@ -217,6 +217,11 @@ impl Span {
                 let (a, s) = node.from_afar::<SLOPE>(r, r2);
                 angle += a;
                 slope += s;
+                if SLOPE && node.triangle != NONE && !node.sides[2] {
+                    // The chord of the chain, as a side of the triangle above.
+                    let [from, _, to] = self.triangles[node.triangle as usize].map(|corner| position(corner) - p);
+                    slope += slope_of_edge(from, to);
+                }
                 i = node.skip as usize;
                 continue;
             }
@@ -224,7 +229,11 @@ impl Span {
                 let triangle = &self.triangles[node.triangle as usize];
                 angle += solid_angle(triangle, at);
                 if SLOPE {
-                    slope += slope_of(triangle.map(|corner| position(corner) - p));
+                    // Of other sides the triangles below have the reverse.
+                    let [a, b, c] = triangle.map(|corner| position(corner) - p);
+                    for ([from, to], _) in [[a, b], [b, c], [c, a]].into_iter().zip(node.sides).filter(|side| side.1) {
+                        slope += slope_of_edge(from, to);
+                    }
                 }
             }
             i += 1;
@@ -348,6 +357,12 @@ pub(super) fn solid_angle(triangle: &FineTriangle, at: Corner) -> f64 {
     let relative = triangle.map(|corner| position(corner) - p);
     let (volume, below, scale) = half_angle(relative);
     // In front of a plane and beside the triangle it is small, whatever its sign.
+    if volume.abs() < 0.05 * below {
+        // The series of the arc tangent, to 1e-12.
+        let t = volume / below;
+        let t2 = t * t;
+        return 2.0 * t * (1.0 - t2 * (1.0 / 3.0 - t2 * (1.0 / 5.0 - t2 * (1.0 / 7.0))));
+    }
     if below > 1e-6 * scale {
         return 2.0 * volume.atan2(below);
     }
@@ -383,13 +398,14 @@ fn side(triangle: &FineTriangle, at: Corner) -> f64 {
 
 /// The slope of a triangle's solid angle, from its corners relative to the point: that of a current round its edges.
 pub(super) fn slope_of([a, b, c]: [DVec3; 3]) -> DVec3 {
-    let of_edge = |a: DVec3, b: DVec3| {
-        let (la, lb) = (a.length(), b.length());
-        let below = la * lb * (la * lb + a.dot(b));
-        // On the line itself there is none.
-        if below > 1e-12 * (la * lb).powi(2) { a.cross(b) * ((la + lb) / below) } else { DVec3::ZERO }
-    };
-    of_edge(a, b) + of_edge(b, c) + of_edge(c, a)
+    slope_of_edge(a, b) + slope_of_edge(b, c) + slope_of_edge(c, a)
+}
+
+fn slope_of_edge(a: DVec3, b: DVec3) -> DVec3 {
+    let (la, lb) = (a.length(), b.length());
+    let below = la * lb * (la * lb + a.dot(b));
+    // On the line itself there is none.
+    if below > 1e-12 * (la * lb).powi(2) { a.cross(b) * ((la + lb) / below) } else { DVec3::ZERO }
 }
 
 #[cfg(test)]
