@@ -79,13 +79,15 @@ pub(super) fn loops(
     let mut arcs: Vec<(&Arc, Candidate)> = round.into_iter().zip(thinnest?).collect();
     // Areas are not negative: their bits have their order.
     arcs.sort_by_key(|(_, thin)| Reverse((thin.section.area.to_bits(), thin.section.squares, thin.edge)));
-    arcs.retain(|(arc, thin)| !join(&mut parent, arc) && !thin.section.is_wide());
+    arcs.retain(|(arc, _)| !join(&mut parent, arc));
     let mut loops: Vec<Loop> = arcs
         .into_par_iter()
         .map_init(
             || Sections::new(complex, &signs).up_to(limit),
             |sections, (arc, thin)| refined(sections, &skeleton.spots[arc.edges.clone()], thin),
         )
+        // Where a wide section was found first, a thin one may yet be near.
+        .filter(|found: &Loop| !found.section.is_wide())
         .collect();
     loops.sort_by_key(|found| (found.section.area.to_bits(), found.section.squares, found.edge));
     Ok(loops)
@@ -191,7 +193,7 @@ const AS_GOOD: f64 = 1.0 + 1.0 / 12.0;
 
 /// The thinnest section near a thin one; of a tube, where many are about the same, one of those with the fewest squares.
 fn refined(sections: &mut Sections<'_>, edges: &[Spot], best: Candidate) -> Loop {
-    let wide = width(best.section.area);
+    let wide = width(best.section.area.min(sections.limit()));
     let mut best = best;
     let mut taken = Vec::new();
     if edges.len() > LONG * wide {
@@ -218,7 +220,7 @@ fn around(
     mut best: Candidate,
     cost: impl Fn(&Candidate) -> f64,
 ) -> Candidate {
-    let mut step = width(best.section.area).div_ceil(4);
+    let mut step = width(best.section.area.min(sections.limit())).div_ceil(4);
     while step > 0 {
         let middle = best.place;
         for i in [middle.checked_sub(step), Some(middle + step)].into_iter().flatten().filter(|&i| i < edges.len()) {
