@@ -48,8 +48,8 @@ impl<'a> Around<'a> {
         let touched = self.patch.touched;
         self.brick = touched.bricks[brick].at;
         self.entries.fill(EMPTY);
-        for steps in (0..27).map(|i| [i / 9, i / 3 % 3, i % 3].map(|step| step as i32 - 1)) {
-            let Some(beside) = touched.find(std::array::from_fn(|a| self.brick[a] + steps[a])) else { continue };
+        for (steps, place) in touched.around(brick) {
+            let beside = &touched.bricks[place];
             let bits = Y[(steps[1] + 1) as usize] & Z[(steps[2] + 1) as usize];
             let words = [7..8, 0..8, 0..1][(steps[0] + 1) as usize].clone();
             // A neighbour's last layer comes to stand at 0, the brick's first at 1.

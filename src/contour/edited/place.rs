@@ -30,56 +30,92 @@ const ROUNDS: usize = 6;
 /// again.
 const STEP: f64 = 0.5;
 
-/// The positions of the vertices of touched cells, in cells. Cost: linear in vertices and their neighbours, in parallel.
+/// The positions of the vertices of touched cells, in cells, appended to `fixed`, those of the ring. Cost: linear in vertices and their
+/// neighbours, in parallel.
 pub(super) fn place(
     octree: &SignedOctree,
     placement: Placement<'_>,
     touched: &Touched,
     neighbours: &Neighbours,
-    fixed: &[DVec3],
+    fixed: Vec<DVec3>,
 ) -> Vec<DVec3> {
-    let mut points = vec![DVec3::ZERO; touched.vertices as usize];
+    let ring = fixed.len();
+    let mut points = fixed;
+    points.resize(ring + touched.vertices as usize, DVec3::ZERO);
     if placement == Placement::Centre {
-        for_bricks(touched, &mut points, || (), |(), brick, _, points| middles(touched, brick, points));
+        for_bricks(touched, &mut points[ring..], || (), |(), brick, points| middles(touched, brick, points));
         return points;
     }
-    let start = |distances: &mut Distances, brick: usize, _: usize, points: &mut [DVec3]| {
+    for_bricks(touched, &mut points[ring..], Distances::new, |distances, brick, points| {
         distances.fill(octree, touched, brick);
         distances.start(touched, brick, points);
-    };
-    for_bricks(touched, &mut points, Distances::new, start);
-    let mut before = points.clone();
+    });
+    let (count, piece) = touched.pieces();
+    // The last piece that has a brick beside those of each.
+    let askers: Vec<usize> = (0..count)
+        .into_par_iter()
+        .map(|n| {
+            let last = piece(n).flat_map(|brick| touched.around(brick)).map(|(_, beside)| beside).max();
+            (n..count).find(|&n| last.is_none_or(|last| last < piece(n).end)).unwrap_or(n)
+        })
+        .collect();
     for _ in 0..ROUNDS {
-        std::mem::swap(&mut points, &mut before);
-        let position = |n: u32| match n.checked_sub(fixed.len() as u32) {
-            Some(touched) => before[touched as usize],
-            None => fixed[n as usize],
-        };
-        let round = |(): &mut (), brick: usize, first: usize, points: &mut [DVec3]| {
-            let mut vertices = points.iter_mut().zip(first..);
-            for (cell, at) in touched.bricks[brick].cells() {
-                let shape = touched.shape(touched.cells[cell]);
-                for vertex in 0..shape.vertices {
-                    let (point, i) = vertices.next().expect("as many as the cells have");
-                    let around = neighbours.of(i);
-                    let mean = around.iter().map(|&n| position(n)).sum::<DVec3>() / around.len() as f64;
-                    let [low, high] = range(shape, vertex).map(|end| DVec3::from(at.map(f64::from)) + end);
-                    *point = before[i].lerp(mean, STEP).clamp(low, high);
-                }
-            }
-        };
-        for_bricks(touched, &mut points, || (), round);
+        smooth(touched, neighbours, &askers, ring, &mut points);
     }
     points
 }
 
-/// Calls `each` for all bricks, in parallel, with the number of the brick's first vertex and the places for the results of all its
-/// vertices.
+/// Pieces that move at the same time.
+const WAVE: usize = 64;
+
+/// One round. All vertices move at once: the new positions of a piece wait until the last piece that asks for the old ones has moved. Along
+/// the Z-order few of them wait at a time.
+fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut [DVec3]) {
+    let (count, piece) = touched.pieces();
+    let mut waiting: Vec<(usize, Vec<DVec3>)> = Vec::new();
+    for wave in (0..count).step_by(WAVE) {
+        let end = count.min(wave + WAVE);
+        let moved = |n| (n, piece(n).flat_map(|brick| moved(touched, neighbours, ring, points, brick)).collect());
+        waiting.par_extend((wave..end).into_par_iter().map(moved));
+        waiting.retain(|(n, moved)| {
+            let is_asked = askers[*n] >= end;
+            if !is_asked {
+                let first = ring + touched.first_of(piece(*n).start) as usize;
+                points[first..first + moved.len()].copy_from_slice(moved);
+            }
+            is_asked
+        });
+    }
+}
+
+/// Where the vertices of a brick go in a round.
+fn moved<'a>(
+    touched: &'a Touched,
+    neighbours: &'a Neighbours,
+    ring: usize,
+    points: &'a [DVec3],
+    brick: usize,
+) -> impl Iterator<Item = DVec3> + 'a {
+    touched.bricks[brick].cells().flat_map(move |(cell, at)| {
+        let cell = touched.cells[cell];
+        let shape = touched.shape(cell);
+        let origin = DVec3::from(at.map(f64::from));
+        (0..shape.vertices).map(move |vertex| {
+            let i = cell.first as usize + usize::from(vertex);
+            let around = neighbours.of(i);
+            let mean = around.iter().map(|&n| points[n as usize]).sum::<DVec3>() / around.len() as f64;
+            let [low, high] = range(shape, vertex).map(|end| origin + end);
+            points[ring + i].lerp(mean, STEP).clamp(low, high)
+        })
+    })
+}
+
+/// Calls `each` for all bricks, in parallel, with the places for the results of the brick's vertices.
 fn for_bricks<S>(
     touched: &Touched,
     mut points: &mut [DVec3],
     init: impl Fn() -> S + Sync + Send,
-    each: impl Fn(&mut S, usize, usize, &mut [DVec3]) + Sync + Send,
+    each: impl Fn(&mut S, usize, &mut [DVec3]) + Sync + Send,
 ) {
     let (count, piece) = touched.pieces();
     let mut pieces = Vec::with_capacity(count);
@@ -91,9 +127,9 @@ fn for_bricks<S>(
     }
     pieces.into_par_iter().for_each_init(init, |state, (n, mut points)| {
         for brick in piece(n) {
-            let first = touched.first_of(brick);
-            let (of_brick, rest) = points.split_at_mut((touched.first_of(brick + 1) - first) as usize);
-            each(state, brick, first as usize, of_brick);
+            let vertices = touched.first_of(brick + 1) - touched.first_of(brick);
+            let (of_brick, rest) = points.split_at_mut(vertices as usize);
+            each(state, brick, of_brick);
             points = rest;
         }
     });
@@ -163,14 +199,15 @@ fn position_of(corner: Corner) -> DVec3 {
     DVec3::from(Axis::ALL.map(|a| f64::from(u8::from(corner & a))))
 }
 
+/// The corners on the low side of each axis.
+const LOW: [Mask; 3] = [0x0f, 0x33, 0x55];
+
 /// Where a vertex may go, from where its cell starts.
 #[inline]
 fn range(shape: &Shape, vertex: u8) -> [DVec3; 2] {
     if shape.vertices == 1 {
         return [DVec3::splat(MARGIN), DVec3::splat(1.0 - MARGIN)];
     }
-    /// The corners on the low side of each axis.
-    const LOW: [Mask; 3] = [0x0f, 0x33, 0x55];
     let corners = shape.corners_of(vertex);
     [
         DVec3::from(LOW.map(|side| if corners & side != 0 { MARGIN } else { 0.5 + MARGIN })),

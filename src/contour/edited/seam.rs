@@ -61,10 +61,12 @@ impl<'a> Seam<'a> {
     /// Passes on the points of the patch, unless that was done: all others have passed.
     fn end_points(&mut self) -> Result<()> {
         let Some(neighbours) = self.neighbours.take() else { return Ok(()) };
-        let mut points = place(self.octree, self.options.placement, self.patch.touched, &neighbours, &self.fixed);
+        let fixed = std::mem::take(&mut self.fixed);
+        let ring = fixed.len();
+        let mut points = place(self.octree, self.options.placement, self.patch.touched, &neighbours, fixed);
         drop(neighbours);
         points.iter_mut().for_each(|p| *p = self.frame.to_model(*p));
-        self.sink.points(&points)
+        self.sink.points(&points[ring..])
     }
 
     /// Passes on the faces of the patch, which are made once more: that costs less than to keep them.

@@ -62,14 +62,20 @@ pub(super) struct Touched {
     depth: u32,
 }
 
+/// For each touched cell of a brick what it sees of the complex, and its corners inside by their signs.
+type Views = Vec<(Subcomplex, Mask)>;
+
 /// Bricks a piece of the work.
 const PIECE: usize = 16;
 
 /// Bricks one step outside of the root need a name as well: that of a cell in a root four times as wide, in which the octree's own begins
-/// at brick 1 of each axis.
-fn brick_key(depth: u32, brick: At) -> Key {
-    Key::cell(depth - 1, brick.map(|b| (b + 1) as u32)).expect("bricks beside the root fit into one four times as wide")
+/// at brick 1 of each axis. Bricks further off have none.
+fn brick_key(depth: u32, brick: At) -> Option<Key> {
+    Key::cell(depth - 1, brick.map(|b| (b + 1) as u32))
 }
+
+/// Why those that edits touch have a name.
+const NAMED: &str = "edits touch bricks of the root or beside it";
 
 /// The inverse of [`brick_key`].
 fn brick_at(depth: u32, key: Key) -> At {
@@ -110,14 +116,16 @@ impl Touched {
         let (count, piece) = pieces(listed.len(), PIECE);
         let look = |seen: &mut Vec<Subcomplex>, n| {
             let of_brick = |&(key, plane): &(Key, Plane)| {
-                edited.seen_from(brick_at(depth, key), &plane, seen);
-                let place = edited.place(brick_at(depth, key));
-                (key, plane, place, seen.iter().copied().zip(signs(octree.signed(), place, &plane)).collect())
+                let at = brick_at(depth, key);
+                let place = edited.place(at);
+                edited.seen_from(at, &plane, seen);
+                (place, seen.iter().copied().zip(signs(octree.signed(), place, &plane)).collect())
             };
             listed[piece(n)].iter().map(of_brick).collect()
         };
-        let list = |bricks: Vec<(Key, Plane, Option<u32>, Vec<(Subcomplex, Mask)>)>| {
-            for (key, plane, place, cells) in bricks {
+        let mut next = listed.iter();
+        let list = |bricks: Vec<(Option<u32>, Views)>| {
+            for ((place, cells), &(key, plane)) in bricks.into_iter().zip(next.by_ref()) {
                 let brick = TouchedBrick { at: brick_at(depth, key), place, plane, first: touched.cells.len() as u32 };
                 touched.index.insert(key, touched.bricks.len() as u32);
                 for (cell, (parts, signs)) in plane.iter().zip(cells) {
@@ -146,8 +154,15 @@ impl Touched {
     }
 
     /// The place of a brick in the list, if it has touched cells. Cost: a hash probe.
-    pub(super) fn find(&self, brick: At) -> Option<&TouchedBrick> {
-        Some(&self.bricks[*self.index.get(brick_key(self.depth, brick))? as usize])
+    pub(super) fn find(&self, brick: At) -> Option<usize> {
+        self.index.get(brick_key(self.depth, brick)?).map(|&place| place as usize)
+    }
+
+    /// The bricks with touched cells among a brick and those round it, with the steps to them. Cost: 27 hash probes.
+    pub(super) fn around(&self, brick: usize) -> impl Iterator<Item = ([i32; 3], usize)> + '_ {
+        let at = self.bricks[brick].at;
+        let steps = (0..27).map(|i| [i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1]);
+        steps.filter_map(move |steps| Some((steps, self.find(std::array::from_fn(|a| at[a] + steps[a]))?)))
     }
 
     /// How many pieces there are to work on, and the bricks of piece number n.
@@ -216,7 +231,7 @@ impl<'a> EditedBricks<'a> {
                 bricks.change(brick, &changed, add);
                 for (corner, cells) in Corner::ALL.into_iter().zip(cells_round(&changed)) {
                     if !cells.is_empty() {
-                        let key = brick_key(depth, stepped(brick, corner, -1));
+                        let key = brick_key(depth, stepped(brick, corner, -1)).expect(NAMED);
                         *touched.get_or_insert_with(key, || Plane::EMPTY) |= cells;
                     }
                 }
@@ -227,7 +242,7 @@ impl<'a> EditedBricks<'a> {
 
     /// Adds elements of a brick or takes them away.
     fn change(&mut self, brick: At, changed: &[Plane; 8], add: bool) {
-        let key = brick_key(self.octree.signed().crossings().depth(), brick);
+        let key = brick_key(self.octree.signed().crossings().depth(), brick).expect(NAMED);
         let place = if let Some(&place) = self.index.get(key) {
             place
         } else {
@@ -258,7 +273,7 @@ impl<'a> EditedBricks<'a> {
 
     /// Those that start in a brick.
     fn of(&self, brick: At) -> [Plane; 8] {
-        let key = brick_key(self.octree.signed().crossings().depth(), brick);
+        let key = brick_key(self.octree.signed().crossings().depth(), brick).expect(NAMED);
         self.index.get(key).map_or_else(|| self.unedited(brick), |&place| self.elements[place as usize])
     }
 
