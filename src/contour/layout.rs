@@ -112,7 +112,12 @@ impl<'a> Layout<'a> {
     /// Calls `each` with the mixed cells of a brick that `select` leaves of each word, their first vertices and their masks (0 if
     /// ordinary).
     #[inline]
-    fn for_cells(&self, brick: usize, select: impl Fn(usize) -> u64, mut each: impl FnMut(Local, u32, Mask)) {
+    pub(super) fn for_cells(
+        &self,
+        brick: usize,
+        select: impl Fn(usize) -> u64,
+        mut each: impl FnMut(Local, u32, Mask),
+    ) {
         let CellBrick { mixed, first, .. } = &self.bricks[brick];
         let mut before = *first;
         let mut knots = self.knots_of(brick).iter().peekable();

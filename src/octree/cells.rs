@@ -103,7 +103,7 @@ impl<'a> Cells<'a> {
 }
 
 /// The transposed matrix of 8 x 8 bits, a row in each byte (Warren, Hacker's Delight, 7-3).
-fn transposed(mut bits: u64) -> u64 {
+pub(crate) fn transposed(mut bits: u64) -> u64 {
     for (distance, mask) in [(7, 0x00aa_00aa_00aa_00aa), (14, 0x0000_cccc_0000_cccc), (28, 0x0000_0000_f0f0_f0f0)] {
         let swap = (bits ^ bits >> distance) & mask;
         bits ^= swap ^ swap << distance;

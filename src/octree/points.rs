@@ -6,7 +6,7 @@
 use super::SignedOctree;
 use super::segments::Segments;
 use crate::grid::Key;
-use crate::grid::brick::{Local, Plane};
+use crate::grid::brick::{Bits, Local, Plane};
 
 /// A point in each mixed cell (one with corners of both signs) of an octree, made or looked up when asked for.
 pub trait CellPoints: Sync {
@@ -85,6 +85,18 @@ impl PointsOfBrick<'_> {
     pub fn get(&self, cell: Local) -> Option<[f32; 3]> {
         let StoredBrick { cells, first, .. } = self.brick;
         cells.get(cell).then(|| self.points[first + cells.rank(cell) as usize])
+    }
+
+    /// Calls `each` with the cells among those of `select`, a word of bits for each x, that have a point, and with the points.
+    pub(crate) fn for_selected(&self, select: impl Fn(usize) -> u64, mut each: impl FnMut(Local, [f32; 3])) {
+        let mut before = self.brick.first;
+        for (x, &word) in self.brick.cells.0.iter().enumerate() {
+            for b in Bits(word & select(x)) {
+                let below = (word & ((1 << b) - 1)).count_ones();
+                each(Local::from_index(x as u32 * 64 + b), self.points[before + below as usize]);
+            }
+            before += word.count_ones() as usize;
+        }
     }
 }
 

@@ -5,11 +5,16 @@
 //! of averaging with the neighbours follow. Vertices of untouched cells stay, and no vertex leaves its octants: those of different cells
 //! and sheets never change places.
 
-use super::polygons::{Patch, Polygons};
-use super::touched::TouchedCell;
+use super::polygons::Polygons;
+use super::shapes::Shape;
+use super::touched::{Touched, TouchedCell};
 use crate::contour::Placement;
+use crate::grid::brick::{Bits, Local};
+use crate::grid::cases::Mask;
 use crate::grid::{Axis, Corner, Edge};
-use crate::octree::crossings::{Crossings, finest_element};
+use crate::octree::SignedOctree;
+use crate::octree::cells::{Cells, Crossing, EdgeTable};
+use crate::octree::crossings::position;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -25,138 +30,250 @@ const ROUNDS: usize = 6;
 /// again.
 const STEP: f64 = 0.5;
 
-/// A vertex on its way.
-#[derive(Debug, Clone, Copy)]
-struct Moving {
-    at: DVec3,
-    /// Where it may go.
-    low: DVec3,
-    high: DVec3,
+/// The positions of the vertices of touched cells, in cells, appended to `fixed`, those of the ring. Cost: linear in vertices and their
+/// neighbours, in parallel.
+pub(super) fn place(
+    octree: &SignedOctree,
+    placement: Placement<'_>,
+    touched: &Touched,
+    neighbours: &Neighbours,
+    fixed: Vec<DVec3>,
+) -> Vec<DVec3> {
+    let ring = fixed.len();
+    let mut points = fixed;
+    points.resize(ring + touched.vertices as usize, DVec3::ZERO);
+    if placement == Placement::Centre {
+        for_bricks(touched, &mut points[ring..], || (), |(), brick, points| middles(touched, brick, points));
+        return points;
+    }
+    for_bricks(touched, &mut points[ring..], Distances::new, |distances, brick, points| {
+        distances.fill(octree, touched, brick);
+        distances.start(touched, brick, points);
+    });
+    let (count, piece) = touched.pieces();
+    // The last piece that has a brick beside those of each.
+    let askers: Vec<usize> = (0..count)
+        .into_par_iter()
+        .map(|n| {
+            let last = piece(n).flat_map(|brick| touched.around(brick)).map(|(_, beside)| beside).max();
+            (n..count).find(|&n| last.is_none_or(|last| last < piece(n).end)).unwrap_or(n)
+        })
+        .collect();
+    for _ in 0..ROUNDS {
+        smooth(touched, neighbours, &askers, ring, &mut points);
+    }
+    points
 }
 
-/// The positions of the vertices of touched cells, in cells. `ring` lists the vertices of other cells that the polygons use, sorted, and
-/// `fixed` their positions. Cost: linear in vertices and their neighbours, in parallel.
-pub(super) fn place(
-    crossings: &Crossings,
-    placement: Placement<'_>,
-    patch: &Patch<'_>,
-    polygons: &Polygons,
-    ring: &[u32],
-    fixed: &[DVec3],
-) -> Vec<DVec3> {
-    if placement == Placement::Centre {
-        return patch.touched.cells.iter().flat_map(middles_of).collect();
+/// Pieces that move at the same time.
+const WAVE: usize = 64;
+
+/// One round. All vertices move at once: the new positions of a piece wait until the last piece that asks for the old ones has moved. Along
+/// the Z-order few of them wait at a time.
+fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut [DVec3]) {
+    let (count, piece) = touched.pieces();
+    let mut waiting: Vec<(usize, Vec<DVec3>)> = Vec::new();
+    for wave in (0..count).step_by(WAVE) {
+        let end = count.min(wave + WAVE);
+        let moved = |n| (n, piece(n).flat_map(|brick| moved(touched, neighbours, ring, points, brick)).collect());
+        waiting.par_extend((wave..end).into_par_iter().map(moved));
+        waiting.retain(|(n, moved)| {
+            let is_asked = askers[*n] >= end;
+            if !is_asked {
+                let first = ring + touched.first_of(piece(*n).start) as usize;
+                points[first..first + moved.len()].copy_from_slice(moved);
+            }
+            is_asked
+        });
     }
-    let mut moving: Vec<Moving> =
-        patch.touched.cells.par_iter().flat_map_iter(|cell| vertices_of(crossings, cell)).collect();
-    let neighbours = Neighbours::new(polygons, ring, patch.kept, moving.len());
-    for _ in 0..ROUNDS {
-        let moved = |(i, vertex): (usize, &Moving)| {
+}
+
+/// Where the vertices of a brick go in a round.
+fn moved<'a>(
+    touched: &'a Touched,
+    neighbours: &'a Neighbours,
+    ring: usize,
+    points: &'a [DVec3],
+    brick: usize,
+) -> impl Iterator<Item = DVec3> + 'a {
+    touched.bricks[brick].cells().flat_map(move |(cell, at)| {
+        let cell = touched.cells[cell];
+        let shape = touched.shape(cell);
+        let origin = DVec3::from(at.map(f64::from));
+        (0..shape.vertices).map(move |vertex| {
+            let i = cell.first as usize + usize::from(vertex);
             let around = neighbours.of(i);
-            let position = |&n: &u32| match n.checked_sub(ring.len() as u32) {
-                Some(touched) => moving[touched as usize].at,
-                None => fixed[n as usize],
-            };
-            let mean = around.iter().map(position).sum::<DVec3>() / around.len() as f64;
-            Moving { at: vertex.at.lerp(mean, STEP).clamp(vertex.low, vertex.high), ..*vertex }
-        };
-        moving = moving.par_iter().enumerate().map(moved).collect();
+            let mean = around.iter().map(|&n| points[n as usize]).sum::<DVec3>() / around.len() as f64;
+            let [low, high] = range(shape, vertex).map(|end| origin + end);
+            points[ring + i].lerp(mean, STEP).clamp(low, high)
+        })
+    })
+}
+
+/// Calls `each` for all bricks, in parallel, with the places for the results of the brick's vertices.
+fn for_bricks<S>(
+    touched: &Touched,
+    mut points: &mut [DVec3],
+    init: impl Fn() -> S + Sync + Send,
+    each: impl Fn(&mut S, usize, &mut [DVec3]) + Sync + Send,
+) {
+    let (count, piece) = touched.pieces();
+    let mut pieces = Vec::with_capacity(count);
+    for n in 0..count {
+        let vertices = touched.first_of(piece(n).end) - touched.first_of(piece(n).start);
+        let (of_piece, rest) = points.split_at_mut(vertices as usize);
+        pieces.push((n, of_piece));
+        points = rest;
     }
-    moving.into_iter().map(|vertex| vertex.at).collect()
+    pieces.into_par_iter().for_each_init(init, |state, (n, mut points)| {
+        for brick in piece(n) {
+            let vertices = touched.first_of(brick + 1) - touched.first_of(brick);
+            let (of_brick, rest) = points.split_at_mut(vertices as usize);
+            each(state, brick, of_brick);
+            points = rest;
+        }
+    });
 }
 
 /// The neighbours of each vertex of a touched cell, in the order of the polygons: first the vertices of the ring, then those of touched
 /// cells.
-struct Neighbours {
+pub(super) struct Neighbours {
+    /// For each vertex where the list of its neighbours ends.
     ends: Vec<u32>,
     list: Vec<u32>,
 }
 
 impl Neighbours {
-    fn new(polygons: &Polygons, ring: &[u32], kept: u32, vertices: usize) -> Self {
-        let mut ends = vec![0; vertices + 1];
+    /// `ring` lists the vertices of other cells that the polygons use, sorted; vertices from number `kept` on are those of touched cells.
+    pub(super) fn new(polygons: &Polygons, ring: &[u32], kept: u32, vertices: u32) -> Self {
+        let mut ends = vec![0; vertices as usize];
         // Each neighbour is the end of one side that begins at the vertex.
         let sides =
             || polygons.sides().filter(|[from, _]| *from >= kept).map(|[from, to]| ((from - kept) as usize, to));
-        sides().for_each(|(from, _)| ends[from + 1] += 1);
-        (0..vertices).for_each(|i| ends[i + 1] += ends[i]);
-        let mut next = ends.clone();
-        let mut list = vec![0; ends[vertices] as usize];
+        sides().for_each(|(from, _)| ends[from] += 1);
+        let mut sum = 0;
+        for end in &mut ends {
+            // Where it begins, for now: it moves on to the end as the list is filled.
+            sum += std::mem::replace(end, sum);
+        }
+        let mut list = vec![0; sum as usize];
         for (from, to) in sides() {
             let number = match to.checked_sub(kept) {
                 Some(touched) => ring.len() as u32 + touched,
                 None => ring.binary_search(&to).expect("the ring has all vertices of untouched cells") as u32,
             };
-            list[next[from] as usize] = number;
-            next[from] += 1;
+            list[ends[from] as usize] = number;
+            ends[from] += 1;
         }
         Neighbours { ends, list }
     }
 
+    #[inline]
     fn of(&self, i: usize) -> &[u32] {
-        &self.list[self.ends[i] as usize..self.ends[i + 1] as usize]
+        let start = if i == 0 { 0 } else { self.ends[i - 1] };
+        &self.list[start as usize..self.ends[i] as usize]
     }
 }
 
-/// The middles of the octants of each vertex of a cell, or of the cell if there is only one.
-fn middles_of(cell: &TouchedCell) -> impl Iterator<Item = DVec3> {
-    let cell = *cell;
-    (0..cell.vertices).map(move |vertex| {
-        let corners = Corner::ALL.into_iter().filter(|c| cell.vertices > 1 && cell.slots[c.index()] == vertex);
-        let (sum, n) = corners.fold((DVec3::ZERO, 0.0), |(sum, n), c| (sum + octant_middle(c), n + 1.0));
-        DVec3::from(cell.at.map(f64::from)) + if n > 0.0 { sum / n } else { DVec3::splat(0.5) }
-    })
+/// The middles of the octants of each vertex of the cells of a brick, or of the cell if it has only one.
+fn middles(touched: &Touched, brick: usize, points: &mut [DVec3]) {
+    let mut points = points.iter_mut();
+    for (cell, at) in touched.bricks[brick].cells() {
+        let shape = touched.shape(touched.cells[cell]);
+        for vertex in 0..shape.vertices {
+            let middle =
+                if shape.vertices == 1 { DVec3::splat(0.5) } else { middle_of_octants(shape.corners_of(vertex)) };
+            *points.next().expect("as many as the cells have") = DVec3::from(at.map(f64::from)) + middle;
+        }
+    }
 }
 
-/// The middle of the octant of a cell at a corner, from where the cell starts.
-fn octant_middle(corner: Corner) -> DVec3 {
-    0.25 + 0.5 * position(corner)
+/// The middle of the octants of a cell at some corners, from where the cell starts.
+fn middle_of_octants(corners: Mask) -> DVec3 {
+    let middles = Bits(u64::from(corners)).map(|c| 0.25 + 0.5 * position_of(Corner::ALL[c as usize]));
+    middles.sum::<DVec3>() / f64::from(corners.count_ones())
 }
 
 /// Where a corner is in its cell.
-fn position(corner: Corner) -> DVec3 {
+fn position_of(corner: Corner) -> DVec3 {
     DVec3::from(Axis::ALL.map(|a| f64::from(u8::from(corner & a))))
 }
 
-/// The vertices of a cell before they are smoothed.
-fn vertices_of(crossings: &Crossings, cell: &TouchedCell) -> impl Iterator<Item = Moving> {
-    let cell = *cell;
-    let origin = DVec3::from(cell.at.map(f64::from));
-    (0..cell.vertices).map(move |vertex| {
-        let corners = || Corner::ALL.into_iter().filter(move |c| cell.slots[c.index()] == vertex);
-        let (mut low, mut high) = (DVec3::ONE, DVec3::ZERO);
+/// The corners on the low side of each axis.
+const LOW: [Mask; 3] = [0x0f, 0x33, 0x55];
+
+/// Where a vertex may go, from where its cell starts.
+#[inline]
+fn range(shape: &Shape, vertex: u8) -> [DVec3; 2] {
+    if shape.vertices == 1 {
+        return [DVec3::splat(MARGIN), DVec3::splat(1.0 - MARGIN)];
+    }
+    let corners = shape.corners_of(vertex);
+    [
+        DVec3::from(LOW.map(|side| if corners & side != 0 { MARGIN } else { 0.5 + MARGIN })),
+        DVec3::from(LOW.map(|side| if corners & !side != 0 { 1.0 - MARGIN } else { 0.5 - MARGIN })),
+    ]
+}
+
+/// How far along their edges the crossings of a brick are.
+struct Distances {
+    edges: EdgeTable<f64>,
+}
+
+impl Distances {
+    fn new() -> Self {
+        Distances { edges: EdgeTable::new(0.0) }
+    }
+
+    fn fill(&mut self, octree: &SignedOctree, touched: &Touched, brick: usize) {
+        let Some(place) = touched.bricks[brick].place else { return };
+        let offsets = octree.crossings().offsets();
+        self.edges
+            .fill(&Cells::new(octree, place as usize), |Crossing { number, .. }| position(offsets[number as usize]));
+    }
+
+    /// The vertices of the cells of a brick before they are smoothed.
+    fn start(&self, touched: &Touched, brick: usize, points: &mut [DVec3]) {
+        let mut points = points.iter_mut();
+        let brick = &touched.bricks[brick];
+        for ((i, at), local) in brick.cells().zip(brick.plane.iter()) {
+            let cell = touched.cells[i];
+            let shape = touched.shape(cell);
+            let origin = DVec3::from(at.map(f64::from));
+            for vertex in 0..shape.vertices {
+                let corners = shape.corners_of(vertex);
+                let (sum, n) = self.crossings_round(shape, cell, local, corners);
+                let middle = || middle_of_octants(corners);
+                // What has the octant to itself stays near its middle.
+                let mean = if n == 0.0 { middle() } else { sum / n };
+                let is_irregular = shape.irregular >> vertex & 1 == 1;
+                let start = if is_irregular { mean.lerp(middle(), 0.5) } else { mean };
+                let [low, high] = range(shape, vertex);
+                *points.next().expect("as many as the cells have") = origin + start.clamp(low, high);
+            }
+        }
+    }
+
+    /// The sum and the number of the places where the surface crosses the edges at some corners of a cell.
+    fn crossings_round(&self, shape: &Shape, cell: TouchedCell, local: Local, corners: Mask) -> (DVec3, f64) {
         let (mut sum, mut n) = (DVec3::ZERO, 0.0);
-        for corner in corners() {
-            let here = position(corner);
-            (low, high) = (low.min(0.5 * here), high.max(0.5 * here + 0.5));
-            for axis in Axis::ALL.into_iter().filter(|&a| !cell.parts.contains(Edge::at(a, corner))) {
+        let sample = self.edges.at(local);
+        let inside = |c: Corner| cell.signs >> c.index() & 1 == 1;
+        for corner in Bits(u64::from(corners)).map(|c| Corner::ALL[c as usize]) {
+            let here = position_of(corner);
+            for axis in Axis::ALL.into_iter().filter(|a| shape.open[a.index()] >> corner.index() & 1 == 1) {
+                let other = corner ^ axis;
+                let distance = if !inside(corner) || inside(other) || shape.corners >> other.index() & 1 == 1 {
+                    DISTANCE
+                } else {
+                    let position = sample(Edge::at(axis, corner));
+                    if corner & axis { 1.0 - position } else { position }
+                };
                 let sign = if corner & axis { -1.0 } else { 1.0 };
-                sum += here + DVec3::AXES[axis.index()] * sign * distance(crossings, &cell, corner, axis);
+                sum += here + DVec3::AXES[axis.index()] * sign * distance;
                 n += 1.0;
             }
         }
-        let middle = corners().map(octant_middle).sum::<DVec3>() / corners().count() as f64;
-        if cell.vertices == 1 {
-            (low, high) = (DVec3::ZERO, DVec3::ONE);
-        }
-        let is_irregular = cell.irregular >> vertex & 1 == 1;
-        // What has the octant to itself stays near its middle.
-        let mean = if n == 0.0 { middle } else { sum / n };
-        let at = if is_irregular { mean.lerp(middle, 0.5) } else { mean };
-        let (low, high) = (low + MARGIN, high - MARGIN);
-        Moving { at: origin + at.clamp(low, high), low: origin + low, high: origin + high }
-    })
-}
-
-/// How far from a corner in the complex the surface crosses the edge along `axis`, which is not in the complex, in cells.
-fn distance(crossings: &Crossings, cell: &TouchedCell, corner: Corner, axis: Axis) -> f64 {
-    let inside = |c: Corner| cell.signs >> c.index() & 1 == 1;
-    let other = corner ^ axis;
-    if !inside(corner) || inside(other) || cell.parts.contains(other) {
-        return DISTANCE;
+        (sum, n)
     }
-    let start = Axis::ALL.map(|a| (cell.at[a.index()] + i32::from(corner & a && a != axis)) as u32);
-    let edge = finest_element(crossings.depth(), start, axis.into());
-    let sample = crossings.sample(edge).expect("an edge between inside and outside is crossed");
-    if corner & axis { 1.0 - sample.position() } else { sample.position() }
 }

@@ -1,10 +1,14 @@
 //! The polygons round the vertices of touched cells, and which ones of the unedited surface they replace.
 
-use super::touched::{At, Touched};
+use super::around::Around;
+use super::shapes::RINGS;
+use super::touched::Touched;
 use crate::contour::layout::Layout;
+use crate::error::Result;
+use crate::grid::Edge;
 use crate::grid::cases::{CASES, is_crossed};
-use crate::grid::{Axis, Corner, Edge, Face};
-use rayon::prelude::*;
+use crate::parallel::in_order;
+use crate::progress::Progress;
 
 /// A set of numbers below some limit that tells how many of its members are below a number.
 #[derive(Debug)]
@@ -42,7 +46,7 @@ impl Ranks {
 /// untouched cells as before, but closing up where others drop out, and then those of touched cells.
 pub(super) struct Patch<'a> {
     pub(super) touched: &'a Touched,
-    layout: &'a Layout<'a>,
+    pub(super) layout: &'a Layout<'a>,
     /// The vertices of the unedited surface that drop out, sorted.
     pub(super) dropped: Vec<u32>,
     pub(super) ranks: Ranks,
@@ -58,6 +62,25 @@ pub(super) struct Polygons {
 }
 
 impl Polygons {
+    /// Appends a polygon, unless it collapses.
+    #[inline]
+    fn push(&mut self, quad: [u32; 4]) {
+        let differs: [bool; 4] = std::array::from_fn(|i| quad[i] != quad[(i + 3) % 4]);
+        match differs.iter().filter(|&&differs| differs).count() {
+            4 => self.quads.push(quad),
+            3 => {
+                let mut corners = quad.into_iter().zip(differs).filter(|corner| corner.1);
+                self.triangles.push(std::array::from_fn(|_| corners.next().expect("three of them").0));
+            }
+            _ => {}
+        }
+    }
+
+    pub(super) fn append(&mut self, mut other: Polygons) {
+        self.quads.append(&mut other.quads);
+        self.triangles.append(&mut other.triangles);
+    }
+
     /// The sides of all polygons in order, each as the ends in the direction in which it is run through.
     pub(super) fn sides(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
         let of_quads = self.quads.iter().flat_map(|q| (0..4).map(move |i| [q[i], q[(i + 1) % 4]]));
@@ -65,22 +88,22 @@ impl Polygons {
     }
 }
 
-/// Touched cells a piece.
-const PIECE: usize = 1024;
-
-/// Four octants round an element of dimension 0, 1 or 2 in the complex and one of a dimension more that is not.
-type Ring = [(At, Corner); 4];
-
 impl<'a> Patch<'a> {
+    /// Cost: linear in the touched cells and, with 2 bits each, the vertices of the whole surface.
     pub(super) fn new(touched: &'a Touched, layout: &'a Layout<'a>) -> Self {
-        let replaced = |cell: &super::touched::TouchedCell| {
-            let case = &CASES[usize::from(cell.signs)].sheets;
-            let first = case.vertex.iter().position(|&v| v == 0);
-            let first = first.map_or(0, |corner| layout.vertex(cell.at.map(|c| c as u32), Corner::ALL[corner]));
-            first..first + u32::from(case.vertices)
-        };
-        let mut dropped: Vec<u32> = touched.cells.par_iter().flat_map_iter(replaced).collect();
-        dropped.par_sort_unstable();
+        let mut dropped = Vec::new();
+        for brick in &touched.bricks {
+            let Some(place) = brick.place else { continue };
+            layout.for_cells(
+                place as usize,
+                |x| brick.plane.0[x],
+                |_, first, mask| {
+                    let vertices = if mask == 0 { 1 } else { CASES[usize::from(mask)].sheets.vertices };
+                    dropped.extend(first..first + u32::from(vertices));
+                },
+            );
+        }
+        dropped.sort_unstable();
         let ranks = Ranks::new(layout.vertices, &dropped);
         let kept = layout.vertices as u32 - dropped.len() as u32;
         assert!(kept.checked_add(touched.vertices).is_some(), "fewer than 2^32 vertices");
@@ -88,139 +111,64 @@ impl<'a> Patch<'a> {
     }
 
     /// Number of quadrilaterals of the unedited surface that have a vertex in a touched cell: one for each crossed edge of those cells.
-    pub(super) fn dropped_quads(&self) -> u64 {
-        let cells = self.touched.cells.par_iter().enumerate();
-        let edges = cells.filter(|(_, cell)| !matches!(cell.signs, 0 | 255)).map(|(i, cell)| {
-            let crossed = Edge::ALL.into_iter().filter(|&e| is_crossed(cell.signs, e));
-            let own = crossed.filter(|edge| self.is_first(i, &round_edge(cell.at, edge.corners()[0], edge.axis())));
-            own.count() as u64
-        });
-        edges.sum()
+    pub(super) fn dropped_quads(&self, progress: &dyn Progress) -> Result<u64> {
+        let mut sum = 0;
+        let (count, piece) = self.touched.pieces();
+        let crossed = |around: &mut Around<'_>, n| piece(n).map(|brick| self.crossed_first(around, brick)).sum::<u64>();
+        let add = |edges| {
+            sum += edges;
+            Ok(())
+        };
+        in_order(count, progress, || Around::new(self), crossed, add)?;
+        Ok(sum)
     }
 
-    /// Whether no touched cell before number `i` is among the cells of the ring.
-    fn is_first(&self, i: usize, ring: &Ring) -> bool {
-        ring.iter().all(|&(at, _)| self.touched.find(at).is_none_or(|other| other >= i))
-    }
-
-    /// The vertex that stands for an octant.
-    fn vertex(&self, (at, corner): (At, Corner)) -> u32 {
-        if let Some(i) = self.touched.find(at) {
-            let cell = &self.touched.cells[i];
-            return self.kept + cell.first + u32::from(cell.slots[corner.index()]);
-        }
-        let before = self.layout.vertex(at.map(|c| c as u32), corner);
-        before - self.ranks.rank(before)
-    }
-
-    /// All polygons with a vertex in a touched cell, in the order of the first such cell.
-    pub(super) fn polygons(&self) -> Polygons {
-        let pieces: Vec<Polygons> = (0..self.touched.cells.len().div_ceil(PIECE))
-            .into_par_iter()
-            .map(|n| {
-                let mut polygons = Polygons::default();
-                let cells = n * PIECE..self.touched.cells.len().min((n + 1) * PIECE);
-                cells.for_each(|i| self.polygons_of(i, &mut polygons));
-                polygons
-            })
-            .collect();
-        let mut all = Polygons::default();
-        for piece in pieces {
-            all.quads.extend(piece.quads);
-            all.triangles.extend(piece.triangles);
-        }
-        all
-    }
-
-    /// The polygons of touched cell `i` that no touched cell before it has.
-    fn polygons_of(&self, i: usize, polygons: &mut Polygons) {
-        let cell = &self.touched.cells[i];
-        let (at, parts) = (cell.at, cell.parts);
-        if cell.vertices == 0 {
-            return;
-        }
-        for corner in Corner::ALL.into_iter().filter(|&c| parts.contains(c)) {
-            for axis in Axis::ALL.into_iter().filter(|&a| !parts.contains(Edge::at(a, corner))) {
-                let mut ring = round_edge(at, corner, axis);
-                if !self.is_first(i, &ring) {
-                    continue;
-                }
-                // Round an edge between two points of the complex there are two polygons, and they may have the same vertices: they
-                // are cut along different diagonals.
-                if corner & axis && parts.contains(corner ^ axis) {
-                    ring.rotate_left(1);
-                }
-                let mut outward = [0; 3];
-                outward[axis.index()] = if corner & axis { -1 } else { 1 };
-                self.push(ring, outward, polygons);
+    /// Number of crossed edges round the touched cells of a brick that no touched cell before has.
+    fn crossed_first(&self, around: &mut Around<'_>, brick: usize) -> u64 {
+        around.fill(brick);
+        let mut sum = 0;
+        for (i, at) in self.touched.bricks[brick].cells() {
+            let signs = self.touched.cells[i].signs;
+            if matches!(signs, 0 | 255) {
+                continue;
             }
+            let here = around.index(at);
+            let own = |edge: &Edge| {
+                let number = 3 * edge.corners()[0].index() + edge.axis().index();
+                !RINGS[number].iter().any(|&(step, _)| around.is_before(here.wrapping_add_signed(step as isize), i))
+            };
+            sum += Edge::ALL.into_iter().filter(|&e| is_crossed(signs, e)).filter(own).count() as u64;
         }
-        for edge in Edge::ALL.into_iter().filter(|&e| parts.contains(e)) {
-            for face in edge.faces().into_iter().filter(|&f| !parts.contains(f)) {
-                let ring = beside_edge(at, edge, face);
-                if self.is_first(i, &ring) {
-                    let behind = edge.faces().into_iter().find(|&f| f != face).expect("two faces meet in an edge");
-                    self.push(ring, normal(behind.opposite()), polygons);
+        sum
+    }
+
+    /// Makes all polygons with a vertex in a touched cell and passes them on in pieces, in the order of the first such cell.
+    pub(super) fn polygons(
+        &self,
+        progress: &dyn Progress,
+        take: impl FnMut(Polygons) -> Result<()> + Send,
+    ) -> Result<()> {
+        let (count, piece) = self.touched.pieces();
+        let make = |around: &mut Around<'_>, n| {
+            let mut polygons = Polygons::default();
+            piece(n).for_each(|brick| self.polygons_of(around, brick, &mut polygons));
+            polygons
+        };
+        in_order(count, progress, || Around::new(self), make, take)
+    }
+
+    /// The polygons of the touched cells of a brick that no touched cell before has.
+    fn polygons_of(&self, around: &mut Around<'_>, brick: usize, polygons: &mut Polygons) {
+        around.fill(brick);
+        for (i, at) in self.touched.bricks[brick].cells() {
+            let here = around.index(at);
+            for &ring in &self.touched.shape(self.touched.cells[i]).rings {
+                let octants = RINGS[usize::from(ring)];
+                let cells = octants.map(|(step, _)| here.wrapping_add_signed(step as isize));
+                if !cells.iter().any(|&cell| around.is_before(cell, i)) {
+                    polygons.push(std::array::from_fn(|i| around.vertex(cells[i], octants[i].1)));
                 }
             }
         }
-        for face in Face::ALL.into_iter().filter(|&f| parts.contains(f)) {
-            self.push(face.corners().map(|corner| (at, corner)), normal(face.opposite()), polygons);
-        }
     }
-
-    /// Appends the polygon with these octants, turned outward, unless it collapses.
-    fn push(&self, ring: Ring, outward: [i32; 3], polygons: &mut Polygons) {
-        let p = ring.map(|(at, corner)| octant_middle(at, corner));
-        let along = |a: usize, b: usize| -> [i32; 3] { std::array::from_fn(|x| p[b][x] - p[a][x]) };
-        let (u, v) = (along(0, 2), along(1, 3));
-        let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-        let mut quad = ring.map(|octant| self.vertex(octant));
-        if (0..3).map(|a| cross[a] * outward[a]).sum::<i32>() < 0 {
-            quad.swap(1, 3);
-        }
-        let mut corners = Vec::with_capacity(4);
-        (0..4).filter(|&i| quad[i] != quad[(i + 3) % 4]).for_each(|i| corners.push(quad[i]));
-        match corners[..] {
-            [_, _, _, _] => polygons.quads.push(quad),
-            [a, b, c] => polygons.triangles.push([a, b, c]),
-            _ => {}
-        }
-    }
-}
-
-/// The octants of the four cells round the edge along `axis` at a corner of the cell at `at`, all at that corner's point.
-fn round_edge(at: At, corner: Corner, axis: Axis) -> Ring {
-    let [u, v] = axis.others();
-    // The diagonal of the ring is the same whichever of the four cells asks.
-    let low = Axis::ALL.map(|a| at[a.index()] - i32::from(a != axis && !(corner & a)));
-    let low_corner = corner | u | v;
-    [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(du, dv)| {
-        let mut there = low;
-        there[u.index()] += du;
-        there[v.index()] += dv;
-        let corner = if du == 1 { low_corner ^ u } else { low_corner };
-        (there, if dv == 1 { corner ^ v } else { corner })
-    })
-}
-
-/// The octants at both ends of an edge of the cell at `at`, in that cell and in the one across `face`.
-fn beside_edge(at: At, edge: Edge, face: Face) -> Ring {
-    let [p, q] = edge.corners();
-    let a = face.axis();
-    let mut beyond = at;
-    beyond[a.index()] += if face.is_high() { 1 } else { -1 };
-    [(at, p), (at, q), (beyond, q ^ a), (beyond, p ^ a)]
-}
-
-/// The middle of an octant in quarters of a cell.
-fn octant_middle(at: At, corner: Corner) -> [i32; 3] {
-    Axis::ALL.map(|a| 4 * at[a.index()] + if corner & a { 3 } else { 1 })
-}
-
-/// The outward normal of a face.
-fn normal(face: Face) -> [i32; 3] {
-    let mut normal = [0; 3];
-    normal[face.axis().index()] = if face.is_high() { 1 } else { -1 };
-    normal
 }

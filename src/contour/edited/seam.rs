@@ -1,21 +1,21 @@
 //! The unedited surface as it passes by, with holes where edits touch it, into which the patch is put.
 
-use super::place::place;
+use super::place::{Neighbours, place};
 use super::polygons::{Patch, Polygons};
 use crate::contour::DualOptions;
 use crate::error::Result;
 use crate::geom::Frame;
 use crate::mesh::{MeshSink, MeshSizes};
-use crate::octree::Crossings;
+use crate::octree::SignedOctree;
+use crate::progress::Progress;
 use glam::DVec3;
 
 /// Takes the unedited surface as polygons and passes the edited one on.
 pub(super) struct Seam<'a> {
     sink: &'a mut (dyn MeshSink + Send),
-    crossings: &'a Crossings,
+    octree: &'a SignedOctree,
     frame: &'a Frame,
     patch: &'a Patch<'a>,
-    polygons: &'a Polygons,
     /// What the edited surface will have.
     sizes: MeshSizes,
     options: DualOptions<'a>,
@@ -25,37 +25,26 @@ pub(super) struct Seam<'a> {
     /// The vertices of untouched cells that the patch uses, and their positions in cells as far as they have passed.
     ring: Vec<u32>,
     fixed: Vec<DVec3>,
-    /// Whether the points of the patch have been passed on.
-    is_placed: bool,
+    /// Of the vertices of the patch; none once its points have been passed on.
+    neighbours: Option<Neighbours>,
 }
 
 impl<'a> Seam<'a> {
     pub(super) fn new(
         sink: &'a mut (dyn MeshSink + Send),
-        crossings: &'a Crossings,
+        octree: &'a SignedOctree,
         frame: &'a Frame,
-        (patch, polygons): (&'a Patch<'a>, &'a Polygons),
+        (patch, polygons): (&'a Patch<'a>, Polygons),
         sizes: MeshSizes,
         options: DualOptions<'a>,
     ) -> Self {
         let mut ring: Vec<u32> = polygons.sides().map(|[from, _]| from).filter(|&v| v < patch.kept).collect();
         ring.sort_unstable();
         ring.dedup();
+        ring.shrink_to_fit();
+        let neighbours = Some(Neighbours::new(&polygons, &ring, patch.kept, patch.touched.vertices));
         let fixed = Vec::with_capacity(ring.len());
-        Seam {
-            sink,
-            crossings,
-            frame,
-            patch,
-            polygons,
-            sizes,
-            options,
-            passed: 0,
-            dropped: 0,
-            ring,
-            fixed,
-            is_placed: false,
-        }
+        Seam { sink, octree, frame, patch, sizes, options, passed: 0, dropped: 0, ring, fixed, neighbours }
     }
 
     /// Passes on points of untouched cells, and keeps those of the ring.
@@ -71,19 +60,24 @@ impl<'a> Seam<'a> {
 
     /// Passes on the points of the patch, unless that was done: all others have passed.
     fn end_points(&mut self) -> Result<()> {
-        if std::mem::replace(&mut self.is_placed, true) {
-            return Ok(());
-        }
-        let placed = place(self.crossings, self.options.placement, self.patch, self.polygons, &self.ring, &self.fixed);
-        let points: Vec<DVec3> = placed.into_iter().map(|p| self.frame.to_model(p)).collect();
-        self.sink.points(&points)
+        let Some(neighbours) = self.neighbours.take() else { return Ok(()) };
+        let fixed = std::mem::take(&mut self.fixed);
+        let ring = fixed.len();
+        let mut points = place(self.octree, self.options.placement, self.patch.touched, &neighbours, fixed);
+        drop(neighbours);
+        points.iter_mut().for_each(|p| *p = self.frame.to_model(*p));
+        self.sink.points(&points[ring..])
     }
 
-    /// Passes on the faces of the patch.
-    pub(super) fn finish(mut self) -> Result<()> {
+    /// Passes on the faces of the patch, which are made once more: that costs less than to keep them.
+    pub(super) fn finish(mut self, progress: &dyn Progress) -> Result<()> {
         self.end_points()?;
-        self.quads(self.polygons.quads.as_flattened())?;
-        self.sink.faces(3, self.polygons.triangles.as_flattened())
+        let mut triangles = Vec::new();
+        self.patch.polygons(progress, |piece: Polygons| {
+            triangles.extend(piece.triangles);
+            self.quads(piece.quads.as_flattened())
+        })?;
+        self.sink.faces(3, triangles.as_flattened())
     }
 
     /// Passes on quadrilaterals, or the triangles they are cut into.

@@ -364,9 +364,10 @@ fn blocks_stay_blocks() {
     let mesh = surface(&octree, true, Placement::Centre);
     assert_eq!(mesh.validate(), Ok(()));
     let frame = frame(4);
-    let touched = Touched::new(&octree);
-    let single = touched.cells.iter().filter(|cell| cell.vertices == 1);
-    let middles: Vec<DVec3> = single.map(|cell| DVec3::from(cell.at.map(f64::from)) + 0.5).collect();
+    let touched = Touched::new(&octree, &Silent).expect("not cancelled");
+    let single = touched.bricks.iter().flat_map(|brick| brick.cells());
+    let single = single.filter(|&(cell, _)| touched.shape(touched.cells[cell]).vertices == 1);
+    let middles: Vec<DVec3> = single.map(|(_, at)| DVec3::from(at.map(f64::from)) + 0.5).collect();
     assert!(middles.len() > 10);
     let there: HashSet<[u64; 3]> = mesh.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect();
     for middle in middles {

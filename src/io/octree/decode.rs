@@ -11,9 +11,10 @@ use super::coarse::MOST_CELLS;
 use super::dialect::{Dialect, Header, Node};
 use crate::error::Result;
 use crate::grid::brick::{Local, Plane};
+use crate::grid::key::{SIDE, deinterleave};
 use crate::grid::{Corner, Key};
 use crate::io::bytes::Bytes;
-use crate::octree::crossings::lattice_point;
+use crate::octree::cells::transposed;
 use crate::progress::{Progress, Stage, check};
 use std::io::Read;
 
@@ -92,6 +93,7 @@ pub(super) fn decode<D: Dialect, R: Read>(
         },
         brick: None,
         leaves: Plane::EMPTY,
+        inside: [0; 512],
         has_coarse: false,
         data: Box::new([D::Leaf::default(); 512]),
         keep,
@@ -156,12 +158,46 @@ fn after(mut cell: Key, root: Key) -> Option<Key> {
     None
 }
 
+/// Where in its brick a cell lies.
+#[inline]
+fn at(depth: u32, cell: Key) -> Local {
+    /// The position of the least corner by its place in the Z-order of the brick.
+    static BY_ORDER: [Local; 512] = {
+        let mut all = [Local::new(0, 0, 0); 512];
+        let mut i = 0;
+        while i < 512 {
+            let [x, y, z] = deinterleave(i);
+            all[i as usize] = Local::new(x, y, z);
+            i += 1;
+        }
+        all
+    };
+    let finest = SIDE.ilog2() - depth;
+    BY_ORDER[(cell.code_inside(Corner::MIN) >> (3 * finest) & 511) as usize]
+}
+
+/// Adds the corners of leaves that are inside to the planes of a brick: a row of eight cells is a matrix of 8 x 8 bits, transposed.
+fn spread(leaves: &Plane, inside: &[u8; 512], corners: &mut [Plane; 8]) {
+    for (i, row) in inside.as_chunks::<8>().0.iter().enumerate() {
+        let (x, shift) = (i >> 3, 8 * (i & 7));
+        let there = leaves.0[x] >> shift & 0xff;
+        if there != 0 {
+            let by_corner = transposed(u64::from_le_bytes(*row)).to_le_bytes();
+            for (plane, bits) in corners.iter_mut().zip(by_corner) {
+                plane.0[x] |= (u64::from(bits) & there) << shift;
+            }
+        }
+    }
+}
+
 struct Decoder<'a, 'k, D: Dialect> {
     made: Decoded,
     /// The brick that is being read.
     brick: Option<Divided>,
     /// Its leaves at the finest level.
     leaves: Plane,
+    /// For each of them the corners that are inside; stale for other cells.
+    inside: [u8; 512],
     /// Whether it holds cells that are to be divided.
     has_coarse: bool,
     /// What they say; stale for other cells.
@@ -199,28 +235,27 @@ impl<D: Dialect> Decoder<'_, '_, D> {
 
     /// Takes a cell of the finest level; `inside` has a bit for each corner.
     fn leaf(&mut self, cell: Key, inside: u8, data: D::Leaf) {
-        let (brick, at) = self.brick_around(cell);
-        let corners = brick.corners.iter_mut().enumerate();
-        corners.filter(|(i, _)| inside >> i & 1 == 1).for_each(|(_, plane)| plane.set(at));
+        let (_, at) = self.brick_around(cell);
+        self.inside[at.index() as usize] = inside;
         self.leaves.set(at);
         self.data[at.index() as usize] = data;
     }
 
     /// The brick that holds a cell, and where in it the cell lies.
     fn brick_around(&mut self, cell: Key) -> (&mut Divided, Local) {
-        let [x, y, z] = lattice_point(self.made.depth, cell);
         let key = cell.ancestor(self.made.depth - 3);
         if self.brick.as_ref().is_none_or(|brick| brick.key != key) {
             self.finish_brick();
             self.leaves = Plane::EMPTY;
         }
         let brick = self.brick.get_or_insert(Divided { key, corners: [Plane::EMPTY; 8] });
-        (brick, Local::new(x, y, z))
+        (brick, self::at(self.made.depth, cell))
     }
 
     /// Puts down the brick that is being read, if there is any.
     fn finish_brick(&mut self) {
-        let Some(brick) = self.brick.take() else { return };
+        let Some(mut brick) = self.brick.take() else { return };
+        spread(&self.leaves, &self.inside, &mut brick.corners);
         let has_coarse = std::mem::take(&mut self.has_coarse);
         if !has_coarse
             && [Plane::EMPTY, Plane::FULL].contains(&brick.corners[0])

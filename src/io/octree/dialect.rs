@@ -70,7 +70,8 @@ pub(super) fn take_f32<R: Read>(bytes: &mut Bytes<'_, R>) -> Result<f32> {
 }
 
 pub(super) fn take_vector<R: Read>(bytes: &mut Bytes<'_, R>) -> Result<[f32; 3]> {
-    Ok([take_f32(bytes)?, take_f32(bytes)?, take_f32(bytes)?])
+    let taken: [u8; 12] = take(bytes)?;
+    Ok(std::array::from_fn(|i| f32::from_le_bytes(std::array::from_fn(|byte| taken[4 * i + byte]))))
 }
 
 pub(super) fn put_vector(vector: [f32; 3], out: &mut Vec<u8>) {

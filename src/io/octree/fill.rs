@@ -6,7 +6,7 @@ use super::pad::LEVELS;
 use crate::geom::Frame;
 use crate::geom::normal::NormalCode;
 use crate::grid::brick::{Local, Plane};
-use crate::grid::{Axis, Edge, Extent};
+use crate::grid::{Axis, Corner, Edge, Extent, Key};
 use crate::octree::crossings::{Sample, finest_element, lattice_point, toward};
 use crate::octree::segments::Segments;
 use crate::octree::{SignedOctree, StoredPoints};
@@ -62,38 +62,55 @@ fn straight(axis: Axis) -> u16 {
 /// A plane whose normal is nearer than this to a right angle with an edge (as sine) crosses it nowhere in particular.
 const PARALLEL: f64 = 1e-3;
 
+/// Cells a side of the table of points: a brick and the layer before it.
+const SIDE: usize = 9;
+/// Entries before that of a cell for one step along each axis.
+const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
+
+/// The points of the cells of a brick and of those before it along one axis or two; not numbers where there is none.
+fn points_round(points: &StoredPoints, brick: Key) -> [[f32; 3]; SIDE.pow(3)] {
+    /// The bits of a word in the last layer.
+    const LAST: [u64; 3] = [!0, 0xff << 56, 0x8080_8080_8080_8080];
+    let mut table = [[f32::NAN; 3]; SIDE.pow(3)];
+    for before in Corner::ALL.into_iter().filter(|&corner| corner != Corner::MAX) {
+        let steps = Axis::ALL.map(|a| -i32::from(before & a));
+        let found = if before == Corner::MIN { Some(brick) } else { brick.toward(toward(steps)) };
+        let Some(found) = found.and_then(|key| points.of_brick(key)) else { continue };
+        let layer = |axis: Axis| if before & axis { LAST[axis.index()] } else { !0 };
+        let select = |x| if before & Axis::X && x < 7 { 0 } else { layer(Axis::Y) & layer(Axis::Z) };
+        found.for_selected(select, |cell, point| {
+            // A neighbour's last cell stands at 0, the brick's first at 1.
+            let c = cell.coords();
+            let at: usize = Axis::ALL
+                .map(|a| if before & a { 0 } else { (c[a.index()] as usize + 1) * STEP[a.index()] })
+                .iter()
+                .sum();
+            table[at] = point;
+        });
+    }
+    table
+}
+
 /// Pushes the samples of a brick's crossings, from the points of the four cells around each: the edge is cut by the plane through their mean with
 /// the cross product of their diagonals as normal.
 pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided, samples: &mut Vec<Sample>) {
     let origin = lattice_point(frame.depth(), brick.key);
-    let home = points.of_brick(brick.key);
+    let table = points_round(points, brick.key);
     for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
-        let others = axis.others();
-        // The bricks at 0, -u, -v and -u - v.
-        let before = |steps: [i32; 2]| {
-            let mut all = [0; 3];
-            others.iter().zip(steps).for_each(|(a, step)| all[a.index()] = step);
-            brick.key.toward(toward(all)).and_then(|key| points.of_brick(key))
-        };
-        let bricks = [home, before([-1, 0]), before([0, -1]), before([-1, -1])];
+        let [u, v] = axis.others().map(|a| STEP[a.index()]);
         for edge in plane.iter() {
             let start = edge.coords();
             let model = frame.to_model(DVec3::from(std::array::from_fn(|a| f64::from(origin[a] + start[a]))));
+            let here: usize = (0..3).map(|a| (start[a] as usize + 1) * STEP[a]).sum();
             // Counter-clockwise round the edge.
-            let around = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|back: [u32; 2]| {
-                let mut at = start;
-                let mut brick = 0;
-                for (i, axis) in others.iter().enumerate() {
-                    let a = axis.index();
-                    brick |= usize::from(at[a] < back[i]) << i;
-                    at[a] = at[a].wrapping_sub(back[i]) & 7;
-                }
-                let point = bricks[brick].and_then(|brick| brick.get(Local::new(at[0], at[1], at[2])));
-                point.map(|p| (DVec3::from(p.map(f64::from)) - model) / frame.cell_size())
+            let around = [0, u, u + v, v].map(|back| {
+                let point = table[here - back];
+                (DVec3::from(point.map(f64::from)) - model) / frame.cell_size()
             });
-            samples.push(match around {
-                [Some(a), Some(b), Some(c), Some(d)] => cut(axis, [a, b, c, d]),
-                _ => Sample { normal: straight(axis), ..HALF_WAY },
+            samples.push(if around.iter().any(|p| p.is_nan()) {
+                Sample { normal: straight(axis), ..HALF_WAY }
+            } else {
+                cut(axis, around)
             });
         }
     }

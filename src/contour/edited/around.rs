@@ -1,0 +1,101 @@
+//! The cells of a brick and those one step round it, so that a polygon finds its vertices without a question to any map.
+
+use super::polygons::Patch;
+use super::touched::{At, TouchedCell};
+use crate::grid::Corner;
+use crate::grid::brick::Bits;
+
+/// Cells a side: a brick and a layer on both sides.
+const SIDE: usize = 10;
+/// Entries before that of a cell for one step along each axis.
+const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
+
+/// How far the entry of the cell so many steps away is.
+pub(super) fn steps_in_table(steps: [i32; 3]) -> i32 {
+    (0..3).map(|a| steps[a] * STEP[a] as i32).sum()
+}
+
+/// A cell round a brick.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    /// Its place in the list of touched cells, or [`UNTOUCHED`].
+    place: u32,
+    cell: TouchedCell,
+}
+
+/// Stands for the place of a cell that is not touched: it comes after all that are.
+const UNTOUCHED: u32 = u32::MAX;
+const EMPTY: Entry = Entry { place: UNTOUCHED, cell: TouchedCell { first: 0, shape: 0, signs: 0 } };
+
+/// The touched cells of a brick and round it.
+pub(super) struct Around<'a> {
+    patch: &'a Patch<'a>,
+    /// The brick, in bricks.
+    brick: At,
+    entries: Box<[Entry; SIDE.pow(3)]>,
+}
+
+impl<'a> Around<'a> {
+    pub(super) fn new(patch: &'a Patch<'a>) -> Self {
+        Around { patch, brick: [0; 3], entries: Box::new([EMPTY; SIDE.pow(3)]) }
+    }
+
+    /// Looks up all cells round a brick. Cost: 27 hash probes, 0.3 us for the table, and 2 ns a touched cell.
+    pub(super) fn fill(&mut self, brick: usize) {
+        /// The bits of a word in the last and in the first layer.
+        const Y: [u64; 3] = [0xff << 56, !0, 0xff];
+        const Z: [u64; 3] = [0x8080_8080_8080_8080, !0, 0x0101_0101_0101_0101];
+        let touched = self.patch.touched;
+        self.brick = touched.bricks[brick].at;
+        self.entries.fill(EMPTY);
+        for (steps, place) in touched.around(brick) {
+            let beside = &touched.bricks[place];
+            let bits = Y[(steps[1] + 1) as usize] & Z[(steps[2] + 1) as usize];
+            let words = [7..8, 0..8, 0..1][(steps[0] + 1) as usize].clone();
+            // A neighbour's last layer comes to stand at 0, the brick's first at 1.
+            let start = 8 * steps_in_table(steps) + steps_in_table([1; 3]);
+            let mut before = beside.first;
+            for (x, &word) in beside.plane.0.iter().enumerate() {
+                if words.contains(&x) {
+                    for b in Bits(word & bits) {
+                        let place = before + (word & ((1 << b) - 1)).count_ones();
+                        let at = start + steps_in_table([x as i32, b as i32 >> 3, b as i32 & 7]);
+                        self.entries[at as usize] = Entry { place, cell: touched.cells[place as usize] };
+                    }
+                }
+                before += word.count_ones();
+            }
+        }
+    }
+
+    /// Where in the table the brick's cell at `at` is.
+    pub(super) fn index(&self, at: At) -> usize {
+        steps_in_table(std::array::from_fn(|a| at[a] - 8 * self.brick[a] + 1)) as usize
+    }
+
+    /// Whether the cell comes before a touched one in the list.
+    #[inline]
+    pub(super) fn is_before(&self, index: usize, place: usize) -> bool {
+        (self.entries[index].place as usize) < place
+    }
+
+    /// The vertex that stands for an octant.
+    #[inline]
+    pub(super) fn vertex(&self, index: usize, corner: Corner) -> u32 {
+        let Entry { place, cell } = self.entries[index];
+        if place == UNTOUCHED {
+            return self.untouched(index, corner);
+        }
+        let slot = self.patch.touched.shape(cell).slots[corner.index()];
+        self.patch.kept + cell.first + u32::from(slot)
+    }
+
+    /// The same for a cell that no edit touches.
+    #[inline(never)]
+    fn untouched(&self, index: usize, corner: Corner) -> u32 {
+        let steps = [index / STEP[0], index / STEP[1] % SIDE, index % SIDE];
+        let at = std::array::from_fn(|a| (8 * self.brick[a] + steps[a] as i32 - 1) as u32);
+        let before = self.patch.layout.vertex(at, corner);
+        before - self.patch.ranks.rank(before)
+    }
+}
