@@ -365,7 +365,7 @@ fn blocks_stay_blocks() {
     assert_eq!(mesh.validate(), Ok(()));
     let frame = frame(4);
     let touched = Touched::new(&octree, &Silent).expect("not cancelled");
-    let single = touched.bricks.iter().flat_map(|brick| brick.cells());
+    let single = touched.bricks.iter().flat_map(super::touched::TouchedBrick::cells);
     let single = single.filter(|&(cell, _)| touched.shape(touched.cells[cell]).vertices == 1);
     let middles: Vec<DVec3> = single.map(|(_, at)| DVec3::from(at.map(f64::from)) + 0.5).collect();
     assert!(middles.len() > 10);

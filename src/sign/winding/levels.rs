@@ -114,8 +114,8 @@ impl Steps {
     /// Adds the jumps of another surface.
     pub(super) fn add(&mut self, other: Steps) {
         let (both_rise, both_fall) = (self.rises & other.rises, self.falls & other.falls);
-        self.rises = self.rises | other.rises;
-        self.falls = self.falls | other.falls;
+        self.rises |= other.rises;
+        self.falls |= other.falls;
         self.more.extend(other.more);
         self.more.extend(both_rise.iter().map(|local| (local, 1)));
         self.more.extend(both_fall.iter().map(|local| (local, -1)));

@@ -214,7 +214,7 @@ impl Span {
             let r2 = r.length_squared();
             let near = FAR * f64::from(node.radius);
             if r2 > near * near {
-                let (a, s) = node.from_afar::<SLOPE>(r, r2);
+                let (a, s) = node.expansion::<SLOPE>(r, r2);
                 angle += a;
                 slope += s;
                 if SLOPE && node.triangle != NONE && !node.sides[2] {
@@ -311,7 +311,7 @@ impl Span {
 
 impl Node {
     /// Solid angle and its slope at a point from which the centre is at `r`.
-    pub(super) fn from_afar<const SLOPE: bool>(&self, r: DVec3, r2: f64) -> (f64, DVec3) {
+    pub(super) fn expansion<const SLOPE: bool>(&self, r: DVec3, r2: f64) -> (f64, DVec3) {
         let area = DVec3::from(self.area.map(f64::from));
         let [xx, yy, zz, yz, zx, xy] = self.moment.map(f64::from);
         let i2 = 1.0 / r2;

@@ -87,7 +87,7 @@ impl View {
         for &i in &self.far {
             let node = &span.nodes[i as usize];
             let r = DVec3::from(node.centre.map(f64::from)) - p;
-            let (a, s) = node.from_afar::<true>(r, r.length_squared());
+            let (a, s) = node.expansion::<true>(r, r.length_squared());
             angle += a;
             slope += s;
         }
