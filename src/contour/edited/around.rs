@@ -2,6 +2,7 @@
 
 use super::polygons::Patch;
 use super::touched::{At, TouchedCell};
+use crate::contour::layout::slot;
 use crate::grid::Corner;
 use crate::grid::brick::Bits;
 
@@ -23,6 +24,8 @@ struct Entry {
     cell: TouchedCell,
 }
 
+/// Stands for the shape of a cell that is not touched but has been looked up.
+const FOUND: u16 = u16::MAX;
 /// Stands for the place of a cell that is not touched: it comes after all that are.
 const UNTOUCHED: u32 = u32::MAX;
 const EMPTY: Entry = Entry { place: UNTOUCHED, cell: TouchedCell { first: 0, shape: 0, signs: 0 } };
@@ -81,7 +84,7 @@ impl<'a> Around<'a> {
 
     /// The vertex that stands for an octant.
     #[inline]
-    pub(super) fn vertex(&self, index: usize, corner: Corner) -> u32 {
+    pub(super) fn vertex(&mut self, index: usize, corner: Corner) -> u32 {
         let Entry { place, cell } = self.entries[index];
         if place == UNTOUCHED {
             return self.untouched(index, corner);
@@ -90,12 +93,19 @@ impl<'a> Around<'a> {
         self.patch.kept + cell.first + u32::from(slot)
     }
 
-    /// The same for a cell that no edit touches.
-    #[inline(never)]
-    fn untouched(&self, index: usize, corner: Corner) -> u32 {
-        let steps = [index / STEP[0], index / STEP[1] % SIDE, index % SIDE];
-        let at = std::array::from_fn(|a| (8 * self.brick[a] + steps[a] as i32 - 1) as u32);
-        let before = self.patch.layout.vertex(at, corner);
-        before - self.patch.ranks.rank(before)
+    /// The same for a cell that no edit touches: several polygons ask, and the first one leaves its vertex in the unedited
+    /// surface and its mask in the entry.
+    fn untouched(&mut self, index: usize, corner: Corner) -> u32 {
+        let Patch { layout, ranks, .. } = self.patch;
+        let cell = &mut self.entries[index].cell;
+        if cell.shape != FOUND {
+            let steps = [index / STEP[0], index / STEP[1] % SIDE, index % SIDE];
+            let at = std::array::from_fn(|a| (8 * self.brick[a] + steps[a] as i32 - 1) as u32);
+            let (_, first, mask) = layout.find(at);
+            *cell = TouchedCell { first, shape: FOUND, signs: mask };
+        }
+        // Masks are kept for cells with several vertices only.
+        let before = cell.first + if cell.signs == 0 { 0 } else { slot(cell.signs, corner) };
+        before - ranks.rank(before)
     }
 }
