@@ -68,7 +68,7 @@ fn auto_says_what_it_took_and_why() {
             Inside::Parity,
             Reason::OpenAndTurned,
         ),
-        ("plate", build("plate"), Inside::Winding, Reason::Open),
+        ("plate", build("plate"), Inside::Parity, Reason::Sheet),
     ];
     for (what, mesh, rule, reason) in cases {
         let (_, repaired) = by(what, &mesh, 6, Inside::Auto);

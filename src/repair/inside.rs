@@ -39,6 +39,8 @@ pub enum Reason {
     Open,
     /// The surface is open, and its faces are turned this way and that.
     OpenAndTurned,
+    /// The surface is open, and what would close it is nearly as large as it is: it encloses next to nothing.
+    Sheet,
 }
 
 impl fmt::Display for Reason {
@@ -52,6 +54,7 @@ impl fmt::Display for Reason {
             Reason::Turned => "the surface is closed, but its faces are not all turned the same way",
             Reason::Open => "the surface is open and its faces are turned the same way",
             Reason::OpenAndTurned => "the surface is open and its faces are turned this way and that",
+            Reason::Sheet => "the surface is open, and its holes are as large as the rest of it",
         })
     }
 }
@@ -97,6 +100,9 @@ pub(super) fn tell(
         let edges = Boundary::of(source, frame, held, progress)?;
         Patches::new(&edges, frame.depth(), held, progress)
     })?;
+    if reason == Reason::Open && patches.hits().len() as f64 > MOST_MISSING * scan.hits.len() as f64 {
+        return by_parity(clock.time(Stage::Scan, || scan.parity(progress))?, Reason::Sheet, clock, progress);
+    }
     let closing = Closing { odd_faces, rings: patches.rings(), switched: patches.hits().len() as u64, vanished: 0 };
     let winding = clock.time(Stage::Sign, || winding_signs(&scan.hits, &patches, progress))?;
     let vanished = vanished(&scan.hits, &winding.octree);
@@ -141,6 +147,10 @@ fn is_rim(circulation: &Circulation) -> bool {
 
 /// Seams may be so many times as long as rims before orientation is not trusted: a few faces of a scan that are turned over do no harm.
 const MOST_SEAMS: f64 = 0.25;
+
+/// What is missing may be so many times as large as what is there, before the surface is a sheet: to tell that sheets enclose nothing takes
+/// winding numbers long, as they are nearly one half all along it.
+const MOST_MISSING: f64 = 0.75;
 
 /// What is to be said of a surface with this boundary.
 fn reason_of(boundary: &[Circulation]) -> Reason {

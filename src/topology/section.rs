@@ -111,8 +111,8 @@ impl<'a> Sections<'a> {
 /// By how much the squares of a section may outnumber its vector area. Staircases make that at most the root of 3; the rest is for folds.
 const WIDEST: f64 = 16.0;
 
-/// And by how much at least: beside a cut, and in noise, small sections are folded back on themselves many times over.
-const FOLDS: usize = 1 << 13;
+/// And by how much at least: noise has small sections with many folds.
+const FOLDS: usize = 256;
 
 /// The length from which on lines are all the same, in cells.
 const FAR: u32 = 64;
