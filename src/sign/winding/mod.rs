@@ -12,10 +12,10 @@
 //!    the number is not 0: the rule *nonzero* of drawing programs, to which it makes no difference if a solid is turned inside out.
 //! 3. Else the triangles are looked at once more for the [`Boundary`], which falls into oriented rings, and these are spanned by
 //!    [`Patches`]. Surface and patches together are closed, so prefix sums of both give whole numbers n.
-//! 4. The generalised winding number is w = n + s, where s is the solid angle of the patches turned round ([`span`]). What patches were chosen
+//! 4. The generalised winding number is w = n + s, where s is the solid angle of the patches turned round (`span`). What patches were chosen
 //!    makes no difference to w. Inside is where w is above one half, in the sense in which most of the input is oriented. (Not where its
 //!    amount is above one half: on the outer side of an open, nearly flat or hollow piece of surface w comes near to -1/2 or goes below.)
-//!    Only near the boundary and where w passes one half is s looked at by the point ([`open`]).
+//!    Only near the boundary and where w passes one half is s looked at by the point (`open`).
 //! 5. An edge whose ends differ is crossed at the hit by which it passes one half; where no hit does, which is in holes, where the
 //!    tangent of w at the edge's middle does, with the gradient of w as normal.
 //!
