@@ -9,7 +9,7 @@
 //! ([`expected_hits`]). It saves filling gigabytes until the limit is met. Where the limit is met, the same estimate tells the depth
 //! that would do.
 
-use super::options::{Options, Surface};
+use super::options::{Inside, Options, Surface};
 use crate::error::{Bytes, Error, Result};
 use crate::geom::Frame;
 use crate::geom::frame::DEPTHS;
@@ -29,6 +29,8 @@ const CROSSING: f64 = 6.6;
 const NORMAL: f64 = 2.0;
 /// Bytes for each crossing while dual contouring looks at it.
 const DUAL: f64 = 2.5;
+/// Bytes for each hit while winding numbers of an open surface are told.
+const WINDING: f64 = 16.0;
 /// An estimate may be wrong by as much, as a factor.
 const SAFETY: f64 = 1.2;
 
@@ -97,7 +99,9 @@ fn estimate(hits: f64, options: &Options, sink: Option<&dyn MeshSink>) -> f64 {
     let sizes = MeshSizes { points: count, faces, corners: faces.saturating_mul(arity) };
     // Sinks need not reckon with more than there can be.
     let sink = sink.filter(|_| hits < 1e15).map_or(0.0, |sink| sink.bytes_for(sizes) as f64);
-    (hits * HIT).max(octree + hits * tables) + sink
+    // Whether the surface is open is not known yet.
+    let hit = if matches!(options.inside, Inside::Auto | Inside::Winding) { WINDING } else { HIT };
+    (hits * hit).max(octree + hits * tables) + sink
 }
 
 impl Progress for Guard<'_> {

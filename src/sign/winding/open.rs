@@ -45,8 +45,9 @@ pub struct Winding {
     pub clipped: u64,
 }
 
-/// Bytes held for each brick: its key, its place in a row, its signs as they are found, in order, and in the octree.
-const BRICK_BYTES: usize = 3 * size_of::<(Key, Plane, Vec<Local>)>() + 3 * size_of::<u64>();
+/// Bytes held for each brick: its key, its place in a row, its signs as they are found and in order. What the octree takes comes mostly
+/// in their stead.
+const BRICK_BYTES: usize = 2 * size_of::<(Key, Plane, Vec<Local>)>() + 3 * size_of::<u64>();
 /// Estimates that may be wrong by more decide too little of a block to be worth their while.
 const MOST: f64 = 0.25;
 /// Half the points along the side of a block.
@@ -69,8 +70,7 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
 
     // The same again with all rough bricks, and those before them, which own edges into them.
     let bricks = bricks.with(parts.rough());
-    // The octree will have about as many crossings as there are hits.
-    progress.hold((2 * hits.bytes() + patches.bytes() + bricks.keys.len() * BRICK_BYTES) as u64)?;
+    progress.hold((hits.bytes() / 4 * 5 + patches.bytes() + bricks.keys.len() * BRICK_BYTES) as u64)?;
     let mut rows = bricks.rows();
     let numbers = Angles::new(hits, patches);
     let made = rows.walk(
