@@ -29,6 +29,8 @@ const CROSSING: f64 = 6.6;
 const NORMAL: f64 = 2.0;
 /// Bytes for each crossing while dual contouring looks at it.
 const DUAL: f64 = 2.5;
+/// What is named as a remedy must do: not all that is held is a quarter with each level less, and stages differ.
+const SPARE: f64 = 1.6;
 /// Bytes for each hit while winding numbers of an open surface are told.
 const WINDING: f64 = 16.0;
 /// An estimate may be wrong by as much, as a factor.
@@ -73,7 +75,7 @@ impl<'a> Guard<'a> {
         };
         let needed = (SAFETY * estimate(hits, options, sink)).max(needed as f64);
         let at = |depth: u32| needed / 4f64.powi((frame.depth() - depth) as i32);
-        let fitting = (*DEPTHS.start()..frame.depth()).rev().find(|&depth| at(depth) <= limit as f64);
+        let fitting = (*DEPTHS.start()..frame.depth()).rev().find(|&depth| SPARE * at(depth) <= limit as f64);
         let remedy = match fitting {
             Some(depth) => {
                 let cells = crate::error::Short(frame.size() / f64::from(1u32 << depth));
