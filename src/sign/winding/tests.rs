@@ -152,14 +152,15 @@ proptest! {
         let (hits, frame) = hits_of(&mesh, 5);
         prop_assert_eq!(circulations(&hits), []);
         let numbers = WholeNumbers::new(&hits);
-        let overlap = numbers.overlap();
+        let (overlap, single) = (numbers.overlap(), hits.are_single());
         let octree = numbers.into_octree(hits);
         prop_assert_eq!(octree.validate(), Ok(()));
         if !overlap {
             let parity = scan(&mut &mesh, &frame, true, &Silent).expect("scanned").crossings;
             let parity = parity_signs(close(parity, &Silent).expect("not cancelled").0);
             prop_assert_eq!(parity.inside(), octree.inside());
-            prop_assert!(parity.crossings().offsets().iter().eq(octree.crossings().offsets().iter()));
+            // Of several hits of an edge, between two balls, each rule has its own choice.
+            prop_assert!(!single || parity.crossings().offsets().iter().eq(octree.crossings().offsets().iter()));
         }
         for i in 0..33u32.pow(3) {
             let at = [i / 33 / 33, i / 33 % 33, i % 33];
