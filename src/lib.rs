@@ -38,12 +38,14 @@
 //!   cell may vanish or grow together: take a greater [`depth`](Options::depth).
 //! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside, unless it is
 //!   [thickened](Options::thicken).
-//! - **Unions ask for orientation.** Closed, oriented solids that overlap become their union. Where the surface is open or its faces are
-//!   turned this way and that, inside is a matter of parity: what lies inside two solids counts as outside. (See [`Inside`].)
+//! - **Unions ask for orientation.** Solids that overlap become their union, and holes are closed by a smooth surface, if faces are turned
+//!   the same way. Where they are turned this way and that, inside is a matter of parity: what lies inside two solids counts as outside.
+//!   (See [`Inside`].)
 //! - **Faces of dual contouring may intersect**, here and there, mostly at creases and in walls thinner than a cell, unless
 //!   [`no_self_intersections`](Options::no_self_intersections) is asked for. Those of marching cubes and blocks never do.
 //!   [`Mesh::self_intersections`] finds them.
-//! - **Sharp edges may have notches** where they pass through cells in which the grid sees one side of them only.
+//! - **Sharp edges** are kept by dual contouring, but for edges nearer to each other than the diagonal of a cell; they have notches with
+//!   [`no_self_intersections`](Options::no_self_intersections), and where the surface is made from an octree file.
 //!
 //! # Where to find what
 //!

@@ -4,5 +4,6 @@ pub mod frame;
 pub mod normal;
 pub mod qef;
 pub mod raster;
+pub(crate) mod triangle;
 
 pub use frame::{Cube, Frame};

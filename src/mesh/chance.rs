@@ -6,7 +6,7 @@ use glam::DVec3;
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Steele, Lea and Flood 2014 ("splitmix64"): enough chance for samples, in three lines. It holds the seed.
-pub(super) struct Chance(pub(super) u64);
+pub(crate) struct Chance(pub(crate) u64);
 
 impl Chance {
     /// The same sequence, so many numbers further on.
@@ -22,7 +22,7 @@ impl Chance {
     }
 
     /// Evenly spread over `0 .. 1`.
-    pub(super) fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 

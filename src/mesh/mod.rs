@@ -1,6 +1,6 @@
 //! Indexed polygons, and what can be said about them.
 
-mod chance;
+pub(crate) mod chance;
 mod distance;
 mod intersect;
 mod meet;

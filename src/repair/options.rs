@@ -136,7 +136,8 @@ pub enum Inside {
     /// Looks at the surface and takes one of the others; the [report](super::InsideChoice) says which and why.
     ///
     /// A surface that is closed, oriented and does not overlap itself gives the same by all rules, at the cost of parity. One that is
-    /// closed and oriented but overlaps itself goes by winding number. So does an open one, if its faces are turned the same way. Where orientation is not to be trusted, parity is taken.
+    /// closed and oriented but overlaps itself goes by winding number. So does an open one, if its faces are turned the same way and it is
+    /// more than a sheet. Where orientation is not to be trusted, parity is taken.
     #[default]
     Auto,
     /// Inside is what an odd number of walls keeps from the outside, once holes are closed. Which way faces are turned makes no

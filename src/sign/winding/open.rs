@@ -3,13 +3,14 @@
 //! A lattice point is inside if w = n + s is above one half, n being the whole number of hits and patches together, and s the angle of the
 //! spanning surface. Nearly everywhere that is known without looking at the point:
 //!
-//! - From the root down, a cell which no patch enters is looked at. Where patches are too small and too far for |s| to come to one half,
-//!   inside is where n is positive. Else there is one angle at its middle, and [`Span::steepness`] bounds how much it differs within. Where that leaves one answer to how large n must be, the cell is *calm*: bits of n are compared, 64 points at once. Cells
-//!   without hits, whose n is one number, are calm wherever w stays away from one half.
+//! - From the root down, cells which no patch enters are looked at. Where patches are too small and too far for |s| to come to one half,
+//!   inside is where n is positive. Else the angle at the cell's middle and a bound of how much it differs within (`Span::steepness`) may
+//!   leave one answer to how large n must be. Then the cell is *calm*: bits of n are compared, 64 points at once. Cells without hits, whose
+//!   n is one number, are calm wherever w stays away from one half.
 //! - What is left are *rough* bricks: near the boundary, along patches, and where the surface w = 1/2 closes a hole. In each block of 4 x 4 x 4
 //!   points, value and slope of the angle at its middle and the bound of the second derivative decide about all points but those within a
 //!   fraction of a cell of that surface. These are looked at one by one.
-//! - Blocks next to the boundary have a [`View`]: what is near is summed up for every point, the rest is a polynomial.
+//! - Blocks next to the boundary have a `View`: what is near is summed up for every point, the rest is a polynomial.
 //!
 //! w is continuous across patches: in a block it is followed from the middle, and jumps at hits of the surface only.
 //!
@@ -72,12 +73,12 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     let bricks = bricks.with(parts.rough());
     progress.hold((hits.bytes() / 4 * 5 + patches.bytes() + bricks.keys.len() * BRICK_BYTES) as u64)?;
     let mut rows = bricks.rows();
-    let numbers = Angles::new(hits, patches);
+    let angles = Angles::new(hits, patches);
     let made = rows.walk(
         |i| bricks.steps(i),
         |i| {
             let key = bricks.keys[i];
-            Points { angles: &numbers, key, least: parts.least(key), numbers: Vec::new(), inside: Plane::EMPTY }
+            Points { angles: &angles, key, least: parts.least(key), numbers: Vec::new(), inside: Plane::EMPTY }
         },
     );
     check(progress)?;
@@ -96,7 +97,7 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
         let origin = lattice_point(depth, *key);
         let elsewhere = |axis, local: Local| {
             let c = local.coords();
-            numbers.sample(axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
+            angles.sample(axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
         };
         push_samples(hits, *key, inside, crossed, rule, elsewhere, out);
     });
