@@ -1,6 +1,7 @@
 //! Indexed polygons, and what can be said about them.
 
 pub(crate) mod chance;
+mod corners;
 mod distance;
 mod intersect;
 mod meet;
@@ -11,6 +12,7 @@ mod source;
 mod star;
 mod stream;
 mod tally;
+mod topology;
 mod tree;
 mod validate;
 
@@ -19,10 +21,14 @@ pub use polygon::triangulate;
 pub use report::Report;
 pub(crate) use source::Batch;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
+pub use topology::{
+    BoundaryLoop, Diagnosis, EdgeKey, FaceState, Geodesics, MeshKind, Neighbour, Orientation, Search, Topology,
+};
 pub use tree::{Closest, TriangleTree};
 pub use validate::Violation;
 
 use glam::DVec3;
+use std::ops::Range;
 
 /// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
 /// [`report`](Mesh::report) tells which.
@@ -77,8 +83,16 @@ impl Polygons {
     /// # Panics
     /// When there is no polygon `i`.
     pub fn get(&self, i: usize) -> &[u32] {
+        &self.corners[self.range(i)]
+    }
+
+    /// Where the corners of polygon `i` are among [`corners`](Self::corners).
+    ///
+    /// # Panics
+    /// When there is no polygon `i`.
+    pub fn range(&self, i: usize) -> Range<usize> {
         let start = if i == 0 { 0 } else { self.ends[i - 1] as usize };
-        &self.corners[start..self.ends[i] as usize]
+        start..self.ends[i] as usize
     }
 
     /// All polygons in order.

@@ -141,7 +141,7 @@ impl Mesh {
 
 #[cfg(test)]
 mod tests {
-    use super::super::star::Stars;
+    use super::super::corners::Corners;
     use super::*;
     use glam::DVec3;
     use proptest::prelude::*;
@@ -360,7 +360,7 @@ mod tests {
                 pool.install(work);
                 println!("{threads} threads, {what}: {:.1} ns a corner", 1e9 * start.elapsed().as_secs_f64() / corners);
             };
-            time("stars", &|| assert_eq!(Stars::new(&mesh).len(), mesh.points.len()));
+            time("corners", &|| assert_eq!(Corners::new(&mesh).points(), mesh.points.len()));
             time("report", &|| assert!(mesh.report().is_closed()));
             time("validate", &|| mesh.validate().unwrap());
         }
