@@ -3,8 +3,12 @@
 pub(crate) mod chance;
 mod corners;
 mod distance;
+mod edit;
+mod features;
+mod heal;
 mod intersect;
 mod meet;
+mod oriented;
 mod polygon;
 mod report;
 pub mod sample;
@@ -17,6 +21,11 @@ mod tree;
 mod validate;
 
 pub use distance::{Deviation, DistanceOptions, Distances};
+pub use edit::{Edit, FaceId, PointId, SavePoint};
+pub use features::{
+    Chain, Constraint, Constraints, FeatureOptions, Features, Group, Groups, chains, grow,
+};
+pub use heal::{Defects, HealOptions, HealStep, Healed};
 pub use polygon::triangulate;
 pub use report::Report;
 pub(crate) use source::Batch;

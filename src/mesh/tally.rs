@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// A face is flat to zero area when twice its area is at most this part of its longest edge squared: far above the
 /// rounding of doubles near the origin (2e-16), far below the slimmest triangle that single precision can tell (1e-7).
-const FLAT: f64 = 1e-12;
+pub(super) const FLAT: f64 = 1e-12;
 /// Lengths whose sixth powers are in the range of numbers.
 const ORDINARY: std::ops::Range<f64> = 1e-45..1e45;
 /// Points or faces handled at a time. Fixed, so that sums do not depend on the number of threads.

@@ -3,9 +3,12 @@
 mod args;
 mod bars;
 mod compare;
+mod convert;
 mod digits;
+mod features;
 mod goal;
 mod handles;
+mod heal;
 mod info;
 mod interrupt;
 mod json;
@@ -49,6 +52,9 @@ fn run(args: &Args) -> Result<ExitCode> {
         Command::Topology(args) => topology::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Heal(args) => heal::run(args),
+        Command::Features(args) => features::run(args),
+        Command::Convert(args) => convert::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Render(args) => render::run(args),
     }

@@ -1,11 +1,13 @@
 //! What can be said on the command line.
 
 mod compare;
+mod local;
 mod repair;
 mod topology;
 mod values;
 
 pub(crate) use compare::CompareArgs;
+pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
 pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
@@ -76,6 +78,9 @@ pub(crate) enum Command {
     Topology(TopologyArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
+    Heal(HealArgs),
+    Features(FeaturesArgs),
+    Convert(ConvertArgs),
     Sample(SampleArgs),
     Render(RenderArgs),
 }
