@@ -27,7 +27,7 @@ pub(super) struct Corners<'a> {
     mesh: &'a Mesh,
     /// Where each point's corners end.
     ends: Vec<u32>,
-    corners: Vec<u32>,
+    list: Vec<u32>,
     faces: FaceOf,
 }
 
@@ -90,8 +90,8 @@ impl<'a> Corners<'a> {
             // For now where the point's corners start; filling moves it to where they end.
             total += std::mem::replace(end, total);
         }
-        let mut corners = vec![0u32; total as usize];
-        let mut rest = &mut corners[..];
+        let mut list = vec![0u32; total as usize];
+        let mut rest = &mut list[..];
         let mut tasks = Vec::with_capacity(parts);
         let starts: Vec<u32> = ends.iter().step_by(size).copied().chain([total]).collect();
         for (part, cursors) in ends.chunks_mut(size).enumerate() {
@@ -110,7 +110,7 @@ impl<'a> Corners<'a> {
                 }
             });
         });
-        Corners { mesh, ends, corners, faces }
+        Corners { mesh, ends, list, faces }
     }
 
     /// The mesh.
@@ -121,7 +121,7 @@ impl<'a> Corners<'a> {
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
         let faces = if let FaceOf::Mixed(faces) = &self.faces { faces.len() } else { 0 };
-        4 * (self.ends.len() + self.corners.len() + faces) as u64
+        4 * (self.ends.len() + self.list.len() + faces) as u64
     }
 
     /// Number of points, used or not.
@@ -133,7 +133,7 @@ impl<'a> Corners<'a> {
     pub(super) fn at(&self, point: u32) -> &[u32] {
         let v = point as usize;
         let start = if v == 0 { 0 } else { self.ends[v - 1] };
-        &self.corners[start as usize..self.ends[v] as usize]
+        &self.list[start as usize..self.ends[v] as usize]
     }
 
     /// The point of a corner.
@@ -220,7 +220,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let corners = Corners::new(&mesh);
-                (corners.ends, corners.corners)
+                (corners.ends, corners.list)
             })
         };
         assert_eq!(with(1), with(3));

@@ -5,6 +5,7 @@ mod corners;
 mod distance;
 mod edit;
 mod features;
+mod gaps;
 mod heal;
 mod intersect;
 mod meet;
@@ -22,9 +23,8 @@ mod validate;
 
 pub use distance::{Deviation, DistanceOptions, Distances};
 pub use edit::{Edit, FaceId, PointId, SavePoint};
-pub use features::{
-    Chain, Constraint, Constraints, FeatureOptions, Features, Group, Groups, chains, grow,
-};
+pub use features::{Chain, Constraint, Constraints, FeatureOptions, Features, Group, Groups, chains, grow};
+pub use gaps::Gap;
 pub use heal::{Defects, HealOptions, HealStep, Healed};
 pub use polygon::triangulate;
 pub use report::Report;

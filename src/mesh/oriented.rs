@@ -2,7 +2,7 @@
 //!
 //! A long thin triangle that is parallel to no axis has a box that is nearly empty, and a bundle of such triangles has boxes that all
 //! overlap: a tree of boxes then tells nothing apart, and every triangle is compared with every other. So nodes whose boxes are far
-//! larger than the triangles in them get a second box, turned to lie along them (Gottschalk et al. 1996, "OBBTree", with axes from the
+//! larger than the triangles in them get a second box, turned to lie along them (Gottschalk et al. 1996, with axes from the
 //! longest extent instead of a covariance, and only the six axes of the two boxes as separating directions).
 //!
 //! Most meshes have no such nodes and pay for one look at each triangle. Boxes are padded by more than what rounding can do, so what
@@ -130,7 +130,10 @@ impl Slivers {
             let candidates = [Oriented::along(longer, &points), Oriented::around(&points)];
             let turned = candidates.into_iter().flatten().min_by(|x, y| x.area().total_cmp(&y.area()));
             let upright = Oriented::upright(tree.bounds(node)).area();
-            turned.filter(|turned| WORTH * turned.area() < upright).into_iter().for_each(|turned| slivers.put(node, turned));
+            turned
+                .filter(|turned| WORTH * turned.area() < upright)
+                .into_iter()
+                .for_each(|turned| slivers.put(node, turned));
         }
         slivers
     }
@@ -167,7 +170,8 @@ mod tests {
     /// The side of a long thin cylinder of n strips, turned askew, and moved.
     fn bundle(n: u32, length: f64, at: DVec3) -> Mesh {
         let turn = DQuat::from_rotation_arc(DVec3::Z, DVec3::new(0.6, 0.5, 0.7).normalize());
-        let ring = |z: f64| (0..n).map(move |i| DVec3::from((glam::DVec2::from_angle(TAU * f64::from(i) / f64::from(n)), z)));
+        let ring =
+            |z: f64| (0..n).map(move |i| DVec3::from((glam::DVec2::from_angle(TAU * f64::from(i) / f64::from(n)), z)));
         let points = ring(-length).chain(ring(length)).map(|p| turn * p + at).collect();
         let quads = (0..n).map(|i| [i, (i + 1) % n, n + (i + 1) % n, n + i]);
         let faces: Vec<[u32; 3]> = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
@@ -179,7 +183,9 @@ mod tests {
         let tree = TriangleTree::new(mesh);
         [Slivers::new(&tree), Slivers::default()].map(|slivers| {
             let mut count = 0;
-            super::super::intersect::descend(&tree, &slivers, tree.height(), 1, 1, &mut |a, b| count += usize::from(a != b));
+            super::super::intersect::descend(&tree, &slivers, tree.height(), 1, 1, &mut |a, b| {
+                count += usize::from(a != b);
+            });
             count
         })
     }

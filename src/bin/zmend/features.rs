@@ -6,9 +6,9 @@ use crate::units::{count, real};
 use crate::{goal, interrupt};
 use serde_json::json;
 use std::process::ExitCode;
+use zmend::Result;
 use zmend::io::{self, skeleton};
 use zmend::mesh::{FeatureOptions, Topology, chains};
-use zmend::Result;
 
 /// Red, blue, green and violet, by kind.
 const COLOURS: [skeleton::Colour; 4] = [[202, 0, 32], [5, 113, 176], [26, 150, 65], [117, 60, 160]];
@@ -41,11 +41,17 @@ pub(crate) fn run(args: &FeaturesArgs) -> Result<ExitCode> {
     let bytes = interrupt::noted(|| skeleton::write_polylines(&args.out, &lines))?;
     if args.json {
         let path = args.out.display().to_string();
-        print::out(&format!("{}\n", json!({ "path": path, "bytes": bytes, "unknown": found.unknown.len(), "kinds": told })))?;
+        print::out(&format!(
+            "{}\n",
+            json!({ "path": path, "bytes": bytes, "unknown": found.unknown.len(), "kinds": told })
+        ))?;
     } else {
         print::out(&format!("{table}"))?;
         if !found.unknown.is_empty() {
-            print::warning(format_args!("{} edges of faces without area have no angle", count(found.unknown.len() as u64)));
+            print::warning(format_args!(
+                "{} edges of faces without area have no angle",
+                count(found.unknown.len() as u64)
+            ));
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -6,6 +6,7 @@ use crate::print::{self, Table};
 use crate::units::count;
 use crate::{convert, goal};
 use serde_json::{Map, Value, json};
+use std::fmt::Write;
 use std::process::ExitCode;
 use zmend::mesh::{Defects, HealOptions, Healed};
 use zmend::{Result, io};
@@ -50,16 +51,11 @@ pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Self-intersections in words or numbers: those that are too many are more than can be counted.
-fn crossings(defects: &Defects) -> Option<u64> {
-    defects.self_intersections
-}
-
 fn as_json(defects: &Defects, with_crossings: bool) -> Value {
     let mut object: Map<String, Value> =
         defects.counts()[..11].iter().map(|(name, n)| (name.replace([' ', '-'], "_"), json!(n))).collect();
     let most = Defects::MOST as u64 + 1;
-    let pairs = with_crossings.then(|| crossings(defects).unwrap_or(most));
+    let pairs = with_crossings.then(|| defects.self_intersections.unwrap_or(most));
     object.insert("self_intersections".to_owned(), json!(pairs));
     Value::Object(object)
 }
@@ -69,9 +65,9 @@ fn table(healed: &Healed, with_crossings: bool) -> String {
     let (before, after) = (healed.before.counts(), healed.after.counts());
     let found: Vec<usize> = (0..11).filter(|&i| before[i].1 + after[i].1 > 0).collect();
     let words = |defects: &Defects| {
-        crossings(defects).map_or_else(|| format!("over {}", count(Defects::MOST as u64)), count)
+        defects.self_intersections.map_or_else(|| format!("over {}", count(Defects::MOST as u64)), count)
     };
-    let crosses = with_crossings && [&healed.before, &healed.after].iter().any(|d| crossings(d) != Some(0));
+    let crosses = with_crossings && [&healed.before, &healed.after].iter().any(|d| d.self_intersections != Some(0));
     if !found.is_empty() || crosses {
         table.line("", &["before", "after"].map(|name| Some(name.to_owned())));
     }
@@ -84,14 +80,15 @@ fn table(healed: &Healed, with_crossings: bool) -> String {
     let mut text = table.to_string();
     for step in &healed.steps {
         let undone = if step.is_undone { " (undone: something else was worse for it)" } else { "" };
-        text.push_str(&format!("  {} {}{undone}\n", step.name, count(step.count)));
+        let _ = writeln!(text, "  {} {}{undone}", step.name, count(step.count));
     }
     text
 }
 
 fn verdict(healed: &Healed) -> String {
     if healed.after.is_none() {
-        return if healed.steps.is_empty() { "nothing to heal" } else { "healed: closed, manifold, oriented" }.to_owned();
+        return if healed.steps.is_empty() { "nothing to heal" } else { "healed: closed, manifold, oriented" }
+            .to_owned();
     }
     "what is left needs more: zmend repair makes a solid of it, with a surface that is made anew".to_owned()
 }

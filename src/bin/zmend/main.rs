@@ -4,6 +4,7 @@ mod args;
 mod bars;
 mod compare;
 mod convert;
+mod details;
 mod digits;
 mod features;
 mod goal;

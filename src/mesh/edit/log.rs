@@ -112,7 +112,7 @@ impl Log {
     /// Forgets the oldest groups beyond the limit.
     pub(super) fn trim(&mut self) {
         let excess = self.done.len().saturating_sub(self.limit);
-        if let Some(last) = self.done.drain(..excess).last() {
+        if let Some(last) = self.done.drain(..excess).next_back() {
             self.bottom = last.number;
         }
     }

@@ -4,6 +4,11 @@ use super::{Corners, Edit, FaceId, PointId, side};
 use crate::error::{Error, Result};
 use glam::DVec3;
 
+/// Whether a point can be there.
+fn finite(at: DVec3) -> Result<()> {
+    if at.is_finite() { Ok(()) } else { refuse(format!("{at} is no place")) }
+}
+
 /// A refusal.
 fn refuse<T>(problem: String) -> Result<T> {
     Err(Error::setting("edit", problem, "the mesh is as it was"))
@@ -16,7 +21,7 @@ impl Edit {
     /// When a coordinate is not finite.
     pub fn add_point(&mut self, at: DVec3) -> Result<PointId> {
         let point = PointId(self.points.len() as u32);
-        self.finite(at)?;
+        finite(at)?;
         self.group(|edit| {
             edit.set_point(point, Some(at));
             Ok(point)
@@ -29,7 +34,7 @@ impl Edit {
     /// When it is not there, or a coordinate is not finite.
     pub fn move_point(&mut self, point: PointId, to: DVec3) -> Result<()> {
         self.place(point)?;
-        self.finite(to)?;
+        finite(to)?;
         self.group(|edit| {
             edit.set_point(point, Some(to));
             Ok(())
@@ -234,7 +239,8 @@ impl Edit {
             let at = other.iter().position(|&v| v == corners[0]);
             other.len() == n
                 && at.is_some_and(|at| {
-                    (0..n).all(|k| other[(at + k) % n] == corners[k]) || (0..n).all(|k| other[(at + n - k) % n] == corners[k])
+                    (0..n).all(|k| other[(at + k) % n] == corners[k])
+                        || (0..n).all(|k| other[(at + n - k) % n] == corners[k])
                 })
         };
         let copy = self.faces_at(corners[0]).iter().find(|face| !but.contains(face) && is_same(self.corners(**face)));
@@ -247,9 +253,5 @@ impl Edit {
 
     fn existing(&self, face: FaceId) -> Result<&[PointId]> {
         self.face(face).map_or_else(|| refuse(format!("there is no face {}", face.0)), Ok)
-    }
-
-    fn finite(&self, at: DVec3) -> Result<()> {
-        if at.is_finite() { Ok(()) } else { refuse(format!("{at} is no place")) }
     }
 }

@@ -81,7 +81,9 @@ mod tests {
         let found = chains(&topology, &sharp);
         // Twelve edges of two pieces between the corners.
         assert_eq!(found.len(), 12);
-        assert!(found.iter().all(|chain| chain.points.len() == 3 && !chain.is_closed && chain.length(&topology) == 1.0));
+        assert!(
+            found.iter().all(|chain| chain.points.len() == 3 && !chain.is_closed && chain.length(&topology) == 1.0)
+        );
         let pieces: BTreeSet<EdgeKey> = found.iter().flat_map(Chain::pieces).map(|[a, b]| EdgeKey::new(a, b)).collect();
         assert!(pieces.into_iter().eq(sharp.iter().map(|&s| topology.key(s)).collect::<BTreeSet<_>>()));
         // All edges of a surface, each once though given twice.

@@ -48,8 +48,8 @@ impl Constraints {
         }
         let mut sorted = chain.points.clone();
         sorted.sort_unstable();
-        if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return refuse(format!("point {} comes twice", twice[0]));
+        if let Some(&[twice, ..]) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            return refuse(format!("point {twice} comes twice"));
         }
         for [a, b] in chain.pieces() {
             if topology.find(a, b).is_none() {

@@ -101,7 +101,8 @@ impl Groups {
     /// The edges that bound a group, each by its lowest side, ascending; [`Constraints::add_edges`] makes constraints of them.
     pub fn boundary(&self, topology: &Topology<'_>, number: u32) -> Vec<u32> {
         let faces = self.get(number).map_or(&[][..], |group| &group.faces);
-        let sides = faces.iter().flat_map(|&face| topology.sides(face)).filter(|&side| self.is_boundary(topology, side));
+        let sides =
+            faces.iter().flat_map(|&face| topology.sides(face)).filter(|&side| self.is_boundary(topology, side));
         let mut lowest: Vec<u32> = sides.filter_map(|side| topology.users(side).min()).collect();
         lowest.sort_unstable();
         lowest.dedup();
@@ -110,7 +111,8 @@ impl Groups {
 
     /// The groups beyond the boundary of one, ascending.
     pub fn neighbours(&self, topology: &Topology<'_>, number: u32) -> Vec<u32> {
-        let users = self.boundary(topology, number).into_iter().flat_map(|side| topology.users(side).collect::<Vec<_>>());
+        let users =
+            self.boundary(topology, number).into_iter().flat_map(|side| topology.users(side).collect::<Vec<_>>());
         let mut found: Vec<u32> = users.filter_map(|side| self.of_face(topology.face(side))).collect();
         found.sort_unstable();
         found.dedup();
@@ -129,11 +131,14 @@ pub fn grow(topology: &Topology<'_>, seed: u32, constraints: &Constraints, angle
     while let Some(&face) = found.get(i) {
         for side in topology.sides(face) {
             let [a, b] = topology.ends(side);
-            let is_smooth = || angle >= std::f64::consts::PI || topology.dihedral(side).is_some_and(|d| d.abs() <= angle);
-            if let Neighbour::Face(beyond) = topology.neighbour(side) {
-                if constraints.of_edge(a, b).is_none() && is_smooth() && is_in.insert(beyond) {
-                    found.push(beyond);
-                }
+            let is_smooth =
+                || angle >= std::f64::consts::PI || topology.dihedral(side).is_some_and(|d| d.abs() <= angle);
+            if let Neighbour::Face(beyond) = topology.neighbour(side)
+                && constraints.of_edge(a, b).is_none()
+                && is_smooth()
+                && is_in.insert(beyond)
+            {
+                found.push(beyond);
             }
         }
         i += 1;

@@ -39,7 +39,8 @@ pub(super) fn replace_lost(mesh: &Mesh, _: &Setting) -> (Mesh, u64) {
     let mut done = 0;
     loop {
         let middle = |&v: &u32| {
-            let known: Vec<DVec3> = topology.connected(v).map(|w| result.points[w as usize]).filter(|p| p.is_finite()).collect();
+            let known: Vec<DVec3> =
+                topology.connected(v).map(|w| result.points[w as usize]).filter(|p| p.is_finite()).collect();
             let origin = *known.first()?;
             let middle = known.iter().map(|&p| (p - origin) / known.len() as f64).sum::<DVec3>() + origin;
             middle.is_finite().then_some((v, middle))
@@ -107,20 +108,20 @@ pub(super) fn remove_duplicates(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
         return (mesh.clone(), 0);
     }
     let mut goes: BTreeMap<u32, bool> = copies.iter().map(|&face| (face, true)).collect();
-    while !setting.is_bold {
+    loop {
         let mut stays = Vec::new();
         for (&face, _) in goes.iter().filter(|(_, goes)| **goes) {
             let leaves_rim = topology.sides(face).any(|side| {
                 let before = topology.count(side);
                 let gone = topology.users(side).filter(|&user| goes.get(&topology.face(user)) == Some(&true)).count();
                 let after = before - gone as u32;
-                after == 1 || (after % 2 == 1 && before % 2 == 0)
+                after == 1 || (after % 2 == 1 && before.is_multiple_of(2))
             });
             if leaves_rim {
                 stays.push(face);
             }
         }
-        if stays.is_empty() {
+        if stays.is_empty() || setting.is_bold {
             break;
         }
         stays.into_iter().for_each(|face| _ = goes.insert(face, false));

@@ -41,7 +41,8 @@ pub(super) fn remove_flat(mesh: &Mesh, _: &Setting) -> (Mesh, u64) {
         for (i, face) in (0..).zip(mesh.faces.iter()) {
             if let &[a, b, c] = face {
                 let is_sound = topology.is_sound(i) && a != b && b != c && c != a;
-                if is_sound && is_flat([a, b, c].map(|v| mesh.points[v as usize])) && remove(&topology, i, &mut changes) {
+                if is_sound && is_flat([a, b, c].map(|v| mesh.points[v as usize])) && remove(&topology, i, &mut changes)
+                {
                     done += 1;
                 }
             }
@@ -96,7 +97,9 @@ fn collapse(topology: &Topology<'_>, side: u32, changes: &mut Changes) -> bool {
     let around: BTreeSet<u32> = topology.connected(a).collect();
     let common = topology.connected(b).filter(|v| around.contains(v)).count();
     // Rims must not come together: an inner edge may have one end on a rim at most.
-    let on_rim = |v: u32| topology.corners_at(v).iter().any(|&c| topology.count(c) == 1 || topology.count(topology.prev(c)) == 1);
+    let on_rim = |v: u32| {
+        topology.corners_at(v).iter().any(|&c| topology.count(c) == 1 || topology.count(topology.prev(c)) == 1)
+    };
     let pinches = gone.len() == 2 && on_rim(a) && on_rim(b);
     if gone.len() > 2 || !gone.iter().all(is_triangle) || common != gone.len() || pinches {
         return false;
@@ -144,20 +147,19 @@ mod tests {
         let topology = Topology::new(&ball);
         // A cap on every hundredth edge: its middle as a corner of one triangle only, with a flat triangle between.
         let mut mesh = ball.clone();
-        let mut cut: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut cut: BTreeMap<u32, (u32, u32)> = BTreeMap::new();
         for side in topology.edges().step_by(100) {
             let [a, b] = topology.ends(side);
             let middle = mesh.points.len() as u32;
             mesh.points.push(0.5 * (mesh.points[a as usize] + mesh.points[b as usize]));
-            cut.insert(topology.face(side), middle);
+            cut.insert(topology.face(side), (side, middle));
             let [x, y] = [mesh.points[a as usize], mesh.points[b as usize]];
             assert!(is_flat([x, y, mesh.points[middle as usize]]));
         }
         let mut caps = 0;
         mesh = super::super::rebuilt(&mesh, |i, face, faces| {
-            let side = topology.edges().step_by(100).find(|&s| topology.face(s) == i).filter(|_| cut.contains_key(&i));
-            if let Some(side) = side {
-                let ([a, b], c, m) = (topology.ends(side), topology.ends(topology.prev(side))[0], cut[&i]);
+            if let Some(&(side, m)) = cut.get(&i) {
+                let ([a, b], c) = (topology.ends(side), topology.ends(topology.prev(side))[0]);
                 [[a, m, c], [m, b, c], [a, b, m]].iter().for_each(|t| faces.push(t));
                 caps += 1;
             } else {

@@ -58,7 +58,13 @@ pub struct HealOptions {
 
 impl Default for HealOptions {
     fn default() -> Self {
-        HealOptions { tolerance: 1e-6, is_absolute: false, max_hole_edges: 200, smooth: true, check_intersections: true }
+        HealOptions {
+            tolerance: 1e-6,
+            is_absolute: false,
+            max_hole_edges: 200,
+            smooth: true,
+            check_intersections: true,
+        }
     }
 }
 
@@ -235,7 +241,13 @@ impl Mesh {
             return Ok(healed);
         }
         let diagonal = self.report().bounds.extent().length();
-        let unit = if options.is_absolute { 1.0 } else if diagonal.is_finite() { diagonal } else { 0.0 };
+        let unit = if options.is_absolute {
+            1.0
+        } else if diagonal.is_finite() {
+            diagonal
+        } else {
+            0.0
+        };
         let setting = Setting {
             tolerance: options.tolerance * unit,
             max_hole_edges: options.max_hole_edges,

@@ -66,7 +66,11 @@ fn pair(topology: &Topology<'_>, side: u32) -> Option<Vec<[u32; 2]>> {
 
 /// Copies points so that each fan has its own, where fans hang together by ordinary edges, by pairs of sides, and by edges of which
 /// nothing is known. Tells how many copies were made.
-fn copy_points(topology: &Topology<'_>, points: impl IntoIterator<Item = u32>, pairs: &BTreeMap<u32, u32>) -> (Mesh, u64) {
+fn copy_points(
+    topology: &Topology<'_>,
+    points: impl IntoIterator<Item = u32>,
+    pairs: &BTreeMap<u32, u32>,
+) -> (Mesh, u64) {
     let mut mesh = topology.mesh().clone();
     let mut renamed: BTreeMap<u32, u32> = BTreeMap::new();
     for v in points {
@@ -90,10 +94,10 @@ fn copy_points(topology: &Topology<'_>, points: impl IntoIterator<Item = u32>, p
                     };
                     for user in partners {
                         let beyond = if topology.ends(user)[0] == v { user } else { topology.next(user) };
-                        if !fans.contains_key(&beyond) {
-                            fans.insert(beyond, count);
+                        fans.entry(beyond).or_insert_with(|| {
                             waiting.push(beyond);
-                        }
+                            count
+                        });
                     }
                 }
             }
@@ -137,7 +141,9 @@ mod tests {
                     }) as u32
                 })
                 .collect();
-            cube.faces.iter().for_each(|f| mesh.faces.push(&f.iter().map(|&v| numbers[v as usize]).collect::<Vec<_>>()));
+            cube.faces
+                .iter()
+                .for_each(|f| mesh.faces.push(&f.iter().map(|&v| numbers[v as usize]).collect::<Vec<_>>()));
         }
         mesh
     }

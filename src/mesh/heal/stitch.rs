@@ -4,15 +4,11 @@
 //! edge is then as many pieces as the edges on the other side of the crack, and shares them. An edge is only cut where at least half of
 //! its pieces find a partner, itself cut or not, so that cutting never leaves more rim than there was.
 
-use super::weld::Near;
 use super::{Setting, rebuilt};
+use crate::mesh::gaps::{Near, place_on};
 use crate::mesh::{EdgeKey, Mesh, Topology, triangulate};
 use ahash::RandomState;
-use glam::DVec3;
 use hashbrown::HashMap;
-
-/// The most cells along an edge in which points are looked for: longer edges look at all points of rims.
-const MOST_CELLS: f64 = 1e4;
 
 /// Cuts edges of rims at points of rims that lie on them. Tells how many edges were cut.
 pub(super) fn stitch(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
@@ -23,29 +19,20 @@ pub(super) fn stitch(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
     rim.dedup();
     rim.retain(|&v| mesh.points[v as usize].is_finite());
     let at = |v: u32| mesh.points[v as usize];
-    // Cells about as large as edges: a handful of points each.
-    let mean = sides.iter().map(|&side| topology.ends(side).map(at)).map(|[a, b]| a.distance(b)).sum::<f64>()
-        / sides.len().max(1) as f64;
-    let size = mean.max(setting.tolerance);
-    let near = Near::new(rim.iter().map(|&v| (v, at(v))), if size.is_finite() { size } else { 0.0 });
+    let near = Near::of_rim(&topology, &sides, &rim, setting.tolerance);
     let mut cuts: Vec<(u32, Vec<u32>)> = Vec::new();
     for &side in &sides {
         let [a, b] = topology.ends(side);
         let face = mesh.faces.get(topology.face(side) as usize);
         let mut on: Vec<(f64, u32)> = Vec::new();
-        let mut take = |v: u32| {
-            if let Some(t) = place_on(at(a), at(b), at(v), setting.tolerance) {
-                if !face.contains(&v) && !on.iter().any(|&(_, known)| known == v) {
-                    on.push((t, v));
-                }
+        near.along(at(a), at(b), |v| {
+            if let Some(t) = place_on(at(a), at(b), at(v), setting.tolerance)
+                && !face.contains(&v)
+                && !on.iter().any(|&(_, known)| known == v)
+            {
+                on.push((t, v));
             }
-        };
-        let cells = (at(a).distance(at(b)) / size).ceil();
-        if cells <= MOST_CELLS {
-            (0..=cells as u32).for_each(|k| near.each(at(a).lerp(at(b), f64::from(k) / cells.max(1.0)), &mut take));
-        } else {
-            rim.iter().copied().for_each(take);
-        }
+        });
         if !on.is_empty() {
             on.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
             cuts.push((side, on.into_iter().map(|(_, v)| v).collect()));
@@ -53,14 +40,6 @@ pub(super) fn stitch(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
     }
     keep_matching(&topology, &sides, &mut cuts);
     apply(mesh, &topology, &cuts)
-}
-
-/// Where a point lies along an edge, between 0 and 1, if it is on it within the tolerance and away from its ends.
-fn place_on(a: DVec3, b: DVec3, p: DVec3, tolerance: f64) -> Option<f64> {
-    let along = b - a;
-    let t = along.dot(p - a) / along.length_squared();
-    let is_inside = t > 0.0 && t < 1.0 && p.distance(a) > tolerance && p.distance(b) > tolerance;
-    (is_inside && p.distance(a + t * along) <= tolerance).then_some(t)
 }
 
 /// The pieces of a cut edge.
@@ -83,7 +62,8 @@ fn keep_matching(topology: &Topology<'_>, sides: &[u32], cuts: &mut Vec<(u32, Ve
             let pieces = pieces(topology, *side, cut);
             let shared = pieces.iter().filter(|key| users[*key] == 2).count();
             // A piece that is an edge elsewhere, inside the surface, would become non-manifold.
-            let is_free = |key: &EdgeKey| topology.find(key.ends()[0], key.ends()[1]).is_none_or(|s| topology.count(s) == 1);
+            let is_free =
+                |key: &EdgeKey| topology.find(key.ends()[0], key.ends()[1]).is_none_or(|s| topology.count(s) == 1);
             2 * shared >= pieces.len() && pieces.iter().all(is_free)
         });
         if cuts.len() == before {
@@ -121,6 +101,7 @@ mod tests {
     use super::super::tests::setting;
     use super::*;
     use crate::mesh::sample;
+    use glam::DVec3;
 
     /// A cube whose top is one square, while the sides are cut n times: no point of the top's edges is in the middle.
     #[test]
@@ -128,9 +109,8 @@ mod tests {
         for n in [2, 3, 7] {
             let cube = sample::build("cube", n).unwrap();
             let is_top = |mesh: &Mesh, face: &[u32]| face.iter().all(|&v| mesh.points[v as usize].z == 1.0);
-            let corner = |x: f64, y: f64| {
-                cube.points.iter().position(|p| *p == DVec3::new(x, y, 1.0)).expect("a corner") as u32
-            };
+            let corner =
+                |x: f64, y: f64| cube.points.iter().position(|p| *p == DVec3::new(x, y, 1.0)).expect("a corner") as u32;
             let top = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
             for split in [false, true] {
                 let mut open = rebuilt(&cube, |_, face, faces| {
@@ -146,7 +126,11 @@ mod tests {
                 }
                 let before = super::super::clean::without_unused(open).0;
                 let (closed, count) = stitch(&before, &Setting { tolerance: 1e-9, ..setting() });
-                assert_eq!((count, closed.report().boundary_edges, closed.report().zero_area_faces), (4, 0, 0), "{n} {split}");
+                assert_eq!(
+                    (count, closed.report().boundary_edges, closed.report().zero_area_faces),
+                    (4, 0, 0),
+                    "{n} {split}"
+                );
                 assert!((closed.report().volume - 1.0).abs() < 1e-12);
             }
         }

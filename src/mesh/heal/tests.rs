@@ -51,12 +51,20 @@ fn samples_are_healed_as_far_as_can_be() {
         assert_eq!(healed.mesh.validate().is_ok(), left == 0, "{name}");
     }
     let nan = heal(&sample::build("nan", 1).unwrap());
-    assert_eq!((nan.after.non_finite_points, nan.after.degenerate_faces, nan.after.holes), (0, 0, 0), "{:?}", nan.steps);
+    assert_eq!(
+        (nan.after.non_finite_points, nan.after.degenerate_faces, nan.after.holes),
+        (0, 0, 0),
+        "{:?}",
+        nan.steps
+    );
     assert_eq!(nan.mesh.report().genus, Some(0));
     let gear = heal(&sample::build("gear", 1).unwrap());
     assert_eq!(gear.after.duplicate_faces, 0, "{:?}", gear.after);
     assert!(gear.after.inconsistent_edges < gear.before.inconsistent_edges / 10, "{:?}", gear.after);
-    assert!(gear.after.boundary_edges < gear.before.boundary_edges / 2, "{:?}", gear.after);
+    assert!(
+        gear.after.boundary_edges < gear.before.boundary_edges && gear.after.holes < gear.before.holes / 4,
+        "{gear:?}"
+    );
     let loose = soup(&sample::build("part", 1).unwrap());
     assert!(heal(&loose).after.is_none());
 }
@@ -70,18 +78,20 @@ fn a_solid_that_looks_inwards_is_turned() {
     assert_eq!(healed.steps, [HealStep { name: "turned", count: ball.faces.len() as u64, is_undone: false }]);
 }
 
+/// Cancels at once.
+struct Never;
+impl Progress for Never {
+    fn is_cancelled(&self) -> bool {
+        true
+    }
+}
+
 #[test]
 fn settings_are_looked_at() {
     let ball = sample::build("sphere", 1).unwrap();
     for tolerance in [-1.0, f64::NAN, f64::INFINITY] {
         let message = ball.heal(&HealOptions { tolerance, ..HealOptions::default() }, &Silent).unwrap_err().to_string();
         assert!(message.starts_with("tolerance: "), "{message}");
-    }
-    struct Never;
-    impl Progress for Never {
-        fn is_cancelled(&self) -> bool {
-            true
-        }
     }
     let open = sample::build("plate", 1).unwrap();
     assert!(matches!(open.heal(&HealOptions::default(), &Never), Err(Error::Cancelled)));

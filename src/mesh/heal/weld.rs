@@ -6,11 +6,10 @@
 
 use super::clean::push_mapped;
 use super::{Setting, rebuilt};
+use crate::mesh::gaps::Near;
 use crate::mesh::{Mesh, Topology};
 use crate::sets::Sets;
-use ahash::RandomState;
-use glam::{DVec3, I64Vec3};
-use hashbrown::HashMap;
+use glam::DVec3;
 
 /// Welds the points of rims that are within the tolerance. Tells how many points went.
 pub(super) fn weld(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
@@ -64,36 +63,6 @@ fn compare(a: DVec3, b: DVec3) -> std::cmp::Ordering {
     a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
 }
 
-/// Places in cubes as large as a tolerance, or a little larger.
-pub(super) struct Near {
-    cubes: HashMap<I64Vec3, Vec<u32>, RandomState>,
-    size: f64,
-}
-
-impl Near {
-    /// Sorts numbered places into cubes.
-    pub(super) fn new(places: impl Iterator<Item = (u32, DVec3)>, tolerance: f64) -> Self {
-        let places: Vec<(u32, DVec3)> = places.collect();
-        let largest = places.iter().map(|(_, p)| p.abs().max_element()).fold(0.0, f64::max);
-        // Cubes are counted by integers that doubles hold exactly.
-        let size = tolerance.max(largest * 1e-14).max(f64::MIN_POSITIVE);
-        let mut cubes = HashMap::with_hasher(RandomState::with_seeds(5, 6, 7, 8));
-        for (i, p) in places {
-            cubes.entry((p / size).floor().as_i64vec3()).or_insert_with(Vec::new).push(i);
-        }
-        Near { cubes, size }
-    }
-
-    /// Calls with every place in the cube of a point or in one beside it, and maybe others.
-    pub(super) fn each(&self, p: DVec3, mut visit: impl FnMut(u32)) {
-        let cube = (p / self.size).floor().as_i64vec3();
-        for i in 0..27 {
-            let shift = I64Vec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-            self.cubes.get(&(cube + shift)).into_iter().flatten().for_each(|&j| visit(j));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tests::{setting, soup};
@@ -116,7 +85,10 @@ mod tests {
         for by in [0.0, 2e-6] {
             let (welded, count) = weld(&shaken(&torus, by), &setting);
             assert_eq!(welded.validate(), Ok(()), "{by}");
-            assert_eq!((welded.points.len(), count), (torus.points.len(), (torus.faces.len() * 3 - torus.points.len()) as u64));
+            assert_eq!(
+                (welded.points.len(), count),
+                (torus.points.len(), (torus.faces.len() * 3 - torus.points.len()) as u64)
+            );
         }
         assert_eq!(weld(&shaken(&torus, 2e-6), &Setting { tolerance: 0.0, ..setting }).1, 0);
         // Inner points stay.
@@ -132,9 +104,21 @@ mod tests {
         let n = loose.points.len() as u32;
         let mut turned = loose.clone();
         turned.points.reverse();
-        turned.faces = loose.faces.iter().map(|f| f.iter().map(|v| n - 1 - v).collect::<Vec<_>>()).collect::<Vec<_>>().iter().map(|f| &f[..]).collect();
+        turned.faces = loose
+            .faces
+            .iter()
+            .map(|f| f.iter().map(|v| n - 1 - v).collect::<Vec<_>>())
+            .collect::<Vec<_>>()
+            .iter()
+            .map(|f| &f[..])
+            .collect();
         let setting = Setting { tolerance: 1e-5, ..setting() };
-        let places = |mesh: &Mesh| mesh.faces.iter().map(|f| f.iter().map(|&v| mesh.points[v as usize].to_array()).collect::<Vec<_>>()).collect::<Vec<_>>();
+        let places = |mesh: &Mesh| {
+            mesh.faces
+                .iter()
+                .map(|f| f.iter().map(|&v| mesh.points[v as usize].to_array()).collect::<Vec<_>>())
+                .collect::<Vec<_>>()
+        };
         let (one, other) = (weld(&loose, &setting), weld(&turned, &setting));
         assert_eq!((one.1, places(&one.0)), (other.1, places(&other.0)));
         // With a tolerance as large as the small triangles, they go.

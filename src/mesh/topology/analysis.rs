@@ -114,10 +114,13 @@ impl Topology<'_> {
     fn has_bow_ties(&self) -> bool {
         let points = 0..self.corners.points() as u32;
         let init = super::Star::default;
-        points.into_par_iter().map_init(init, |star, point| {
-            star.visit(&self.corners, point);
-            star.fans() > 1
-        }).any(|is_tie| is_tie)
+        points
+            .into_par_iter()
+            .map_init(init, |star, point| {
+                star.visit(&self.corners, point);
+                star.fans() > 1
+            })
+            .any(|is_tie| is_tie)
     }
 
     /// Kind, orientability, spikes and rims. O(n).
@@ -133,10 +136,12 @@ impl Topology<'_> {
         let corners = |test: fn(u32, u32, u32) -> bool| {
             let faces = (0..self.states.len() as u32).into_par_iter();
             let sides = faces.flat_map_iter(|face| self.sides(face));
-            sides.filter(|&c| {
-                let [here, next] = self.ends(c);
-                test(self.corners.point(self.prev(c)), here, next)
-            }).count() as u64
+            sides
+                .filter(|&c| {
+                    let [here, next] = self.ends(c);
+                    test(self.corners.point(self.prev(c)), here, next)
+                })
+                .count() as u64
         };
         Diagnosis {
             kind: self.kind_with(&orientation),
@@ -178,7 +183,8 @@ impl Topology<'_> {
 
     /// Sides along boundary edges, ascending.
     pub fn boundary_sides(&self) -> Vec<u32> {
-        let faces = (0..self.states.len() as u32).into_par_iter().filter(|&f| self.state(f).has(super::FaceState::BOUNDARY));
+        let faces =
+            (0..self.states.len() as u32).into_par_iter().filter(|&f| self.state(f).has(super::FaceState::BOUNDARY));
         faces.flat_map_iter(|face| self.sides(face).filter(|&side| self.count(side) == 1)).collect()
     }
 

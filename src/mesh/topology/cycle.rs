@@ -33,9 +33,8 @@ impl Topology<'_> {
 fn is_same_cycle(a: &[u32], b: &[u32]) -> bool {
     let n = a.len();
     n == b.len()
-        && (0..n).any(|shift| {
-            (0..n).all(|k| a[k] == b[(shift + k) % n]) || (0..n).all(|k| a[k] == b[(shift + n - k) % n])
-        })
+        && (0..n)
+            .any(|shift| (0..n).all(|k| a[k] == b[(shift + k) % n]) || (0..n).all(|k| a[k] == b[(shift + n - k) % n]))
 }
 
 #[cfg(test)]

@@ -278,7 +278,9 @@ fn upper_sides(corners: &Corners<'_>, v: u32, sides: &mut Vec<u64>) {
     for &corner in corners.at(v) {
         let before = corners.prev(corner);
         let ends = [(corners.point(corners.next(corner)), corner), (corners.point(before), before)];
-        sides.extend(ends.iter().filter(|(other, _)| *other > v).map(|&(o, side)| (u64::from(o) << 32) | u64::from(side)));
+        sides.extend(
+            ends.iter().filter(|(other, _)| *other > v).map(|&(o, side)| (u64::from(o) << 32) | u64::from(side)),
+        );
     }
     sides.sort_unstable();
 }

@@ -32,8 +32,12 @@ impl Topology<'_> {
     /// neighbour; where it contradicts itself, the patch has one side only. O(n), 9 bytes a face.
     pub fn orientation(&self) -> Orientation {
         let faces = self.states.len();
-        let mut found =
-            Orientation { patches: vec![Orientation::NONE; faces], turned: vec![false; faces], count: 0, conflicts: vec![] };
+        let mut found = Orientation {
+            patches: vec![Orientation::NONE; faces],
+            turned: vec![false; faces],
+            count: 0,
+            conflicts: vec![],
+        };
         let mut waiting = Vec::new();
         for seed in 0..faces as u32 {
             if found.patches[seed as usize] != Orientation::NONE || !self.is_sound(seed) {

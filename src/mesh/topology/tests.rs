@@ -59,17 +59,18 @@ fn check(mesh: &Mesh) {
     for (face, i) in mesh.faces.iter().zip(0..) {
         let state = topology.state(i);
         let of_face = &of_face[i as usize];
-        let mine = |test: &dyn Fn(&Vec<(u32, bool)>) -> bool| of_face.iter().any(|users| test(users));
-        assert_eq!(state.has(FaceState::BOUNDARY), mine(&|u| u.len() == 1));
-        assert_eq!(state.has(FaceState::NON_MANIFOLD), mine(&|u| u.len() > 2));
-        assert_eq!(state.has(FaceState::INCONSISTENT), mine(&|u| u.len() == 2 && u[0].1 == u[1].1));
+        let mine = |test: fn(&[(u32, bool)]) -> bool| of_face.iter().any(|users| test(users));
+        assert_eq!(state.has(FaceState::BOUNDARY), mine(|u| u.len() == 1));
+        assert_eq!(state.has(FaceState::NON_MANIFOLD), mine(|u| u.len() > 2));
+        assert_eq!(state.has(FaceState::INCONSISTENT), mine(|u| u.len() == 2 && u[0].1 == u[1].1));
         assert_eq!(state.has(FaceState::UNSOUND), !mesh.is_sound(face));
         let neighbours: BTreeSet<u32> = topology.neighbours(i).collect();
         let expected: BTreeSet<u32> = of_face.iter().copied().flatten().map(|u| u.0).filter(|&f| f != i).collect();
         assert_eq!(neighbours, expected);
     }
     // Every boundary edge is in one chain, once.
-    let mut rims: Vec<EdgeKey> = topology.boundary_loops().iter().flat_map(|l| &l.sides).map(|&s| topology.key(s)).collect();
+    let mut rims: Vec<EdgeKey> =
+        topology.boundary_loops().iter().flat_map(|l| &l.sides).map(|&s| topology.key(s)).collect();
     rims.sort_unstable();
     assert!(rims.iter().eq(edges.iter().filter(|(_, u)| u.len() == 1).map(|(key, _)| key)));
     for rim in topology.boundary_loops() {
@@ -213,7 +214,8 @@ fn rims_that_touch_are_told_apart() {
     // Two triangles missing from a tetrahedron's neighbours: an octahedron without two faces that share a point only.
     let octahedron: [&[u32]; 8] =
         [&[0, 2, 4], &[2, 1, 4], &[1, 3, 4], &[3, 0, 4], &[2, 0, 5], &[1, 2, 5], &[3, 1, 5], &[0, 3, 5]];
-    let open: Vec<&[u32]> = octahedron.iter().enumerate().filter(|(i, _)| ![0, 2].contains(i)).map(|(_, f)| *f).collect();
+    let open: Vec<&[u32]> =
+        octahedron.iter().enumerate().filter(|(i, _)| ![0, 2].contains(i)).map(|(_, f)| *f).collect();
     let mesh = mesh(6, &open);
     let loops = Topology::new(&mesh).boundary_loops();
     assert_eq!(loops.len(), 2);

@@ -112,7 +112,9 @@ impl Topology<'_> {
         }
         let mut i = 0;
         while let Some(&(here, depth)) = found.get(i) {
-            found.extend(self.connected(here).filter(|&o| is_in(o, depth + 1) && seen.insert(o)).map(|o| (o, depth + 1)));
+            found.extend(
+                self.connected(here).filter(|&o| is_in(o, depth + 1) && seen.insert(o)).map(|o| (o, depth + 1)),
+            );
             i += 1;
         }
         found
@@ -172,13 +174,10 @@ impl Topology<'_> {
             for &corner in self.corners_at(here) {
                 let &[a, b, c] = self.mesh().faces.get(self.face(corner) as usize) else { continue };
                 for (known, third) in [(a, b), (b, a), (a, c), (c, a), (b, c), (c, b)] {
-                    if known != here && third != here && known != third && !done.contains_key(&third) {
-                        if let Some(length) = done.get(&known).and_then(|&d| {
-                            across([at(here), at(known), at(third)], [far, d])
-                        }) {
-                            offer(third, length);
-                        }
-                    }
+                    let is_open = known != here && third != here && known != third && !done.contains_key(&third);
+                    let from = done.get(&known).filter(|_| is_open);
+                    let way = from.and_then(|&from| across([here, known, third].map(at), [far, from]));
+                    way.into_iter().for_each(|length| offer(third, length));
                 }
             }
         }
@@ -196,7 +195,7 @@ fn across([a, b, c]: [DVec3; 3], [from_a, from_b]: [f64; 2]) -> Option<f64> {
     let corner = DVec2::new(x, ((c - a) - x * along).length());
     let u = 0.5 * (base + (from_a - from_b) * (from_a + from_b) / base);
     let v = from_a * from_a - u * u;
-    if !(v >= 0.0) {
+    if v.is_nan() || v < 0.0 {
         return None;
     }
     let source = DVec2::new(u, -v.sqrt());

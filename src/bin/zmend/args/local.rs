@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use zmend::mesh::HealOptions;
 
 /// Repair what can be repaired locally; every good face stays as it is.
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

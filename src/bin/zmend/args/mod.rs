@@ -139,6 +139,7 @@ pub(crate) struct SampleArgs {
 Examples:
   zmend render broken.ply picture.png
   zmend render broken.ply both.png --compare fixed.ply      side by side at one scale
+  zmend render broken.ply wrong.png --defects               what is wrong, in colour
   zmend render part.stl top.png --elevation 90 --wireframe --size 1600x1200")]
 pub(crate) struct RenderArgs {
     /// Mesh to draw.
@@ -161,6 +162,10 @@ pub(crate) struct RenderArgs {
     /// Draw the edges of faces.
     #[arg(long)]
     pub(crate) wireframe: bool,
+    /// Mark boundary edges green, non-manifold edges violet, edges between faces that run the same way blue, and faces that pass
+    /// through others yellow.
+    #[arg(long)]
+    pub(crate) defects: bool,
     /// Replace OUT.png if it exists.
     #[arg(short, long)]
     pub(crate) force: bool,

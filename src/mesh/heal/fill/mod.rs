@@ -36,7 +36,8 @@ pub(super) fn fill(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
     let mut new_edges = BTreeSet::new();
     let plain: Vec<Option<Patch>> = rims.iter().map(|rim| plain(&topology, rim, &mut new_edges)).collect();
     let smooth = |patch: &Patch| refine::refined(&topology, patch).filter(|_| setting.smooth);
-    let mut patches: Vec<Option<Patch>> = plain.iter().map(|p| p.as_ref().map(|p| smooth(p).unwrap_or_else(|| p.clone()))).collect();
+    let mut patches: Vec<Option<Patch>> =
+        plain.iter().map(|p| p.as_ref().map(|p| smooth(p).unwrap_or_else(|| p.clone()))).collect();
     let mut result = with_patches(mesh, &patches);
     if setting.check_intersections {
         for fallback in [&plain[..], &[]] {
@@ -86,7 +87,8 @@ fn meeting(mesh: &Mesh, result: &Mesh, patches: &[Option<Patch>]) -> Vec<usize> 
     }
     // So many that all have to go, one way or the other.
     let Some(pairs) = result.intersections_from(first, 1 << 20) else { return (0..patches.len()).collect() };
-    let mut bad: Vec<usize> = pairs.iter().flatten().filter(|&&f| f >= first).map(|&f| owners[(f - first) as usize]).collect();
+    let mut bad: Vec<usize> =
+        pairs.iter().flatten().filter(|&&f| f >= first).map(|&f| owners[(f - first) as usize]).collect();
     bad.sort_unstable();
     bad.dedup();
     bad
@@ -110,7 +112,12 @@ mod tests {
             assert!((filled.report().volume / whole.volume - 1.0).abs() < 1e-3);
             let report = filled.report();
             assert!(report.genus == Some(1) && report.zero_area_faces == 0);
-            assert!(!smooth || report.faces.abs_diff(whole.faces) < whole.faces / 50, "{} {}", report.faces, whole.faces);
+            assert!(
+                !smooth || report.faces.abs_diff(whole.faces) < whole.faces / 50,
+                "{} {}",
+                report.faces,
+                whole.faces
+            );
         }
     }
 

@@ -145,7 +145,8 @@ impl Work<'_> {
         let around: Vec<Vec<usize>> = around.into_iter().map(|others| others.into_iter().collect()).collect();
         let mut at: Vec<DVec3> = places.iter().map(|&v| self.at(v)).collect();
         let extent = self.scales.values().copied().fold(0.0, f64::max);
-        let umbrella = |at: &[DVec3], v: usize| around[v].iter().map(|&o| at[o]).sum::<DVec3>() / around[v].len() as f64 - at[v];
+        let umbrella =
+            |at: &[DVec3], v: usize| around[v].iter().map(|&o| at[o]).sum::<DVec3>() / around[v].len() as f64 - at[v];
         for sweep in 0..MEMBRANE + SWEEPS {
             let mut moved = 0f64;
             for v in rim.len()..rim.len() + own {

@@ -60,7 +60,8 @@ pub(super) fn span(topology: &Topology<'_>, rim: &[u32], taken: &BTreeSet<EdgeKe
                 if length == n - 1 {
                     folds = folds.max(fold(here, beyond[j]));
                 }
-                let weight = parts.and(Weight { fold: if folds.is_nan() { 180.0 } else { folds }, area: 0.5 * here.length() });
+                let weight =
+                    parts.and(Weight { fold: if folds.is_nan() { 180.0 } else { folds }, area: 0.5 * here.length() });
                 if weight < least {
                     (least, split[i * n + j]) = (weight, k as u32);
                 }
@@ -93,14 +94,15 @@ mod tests {
     #[test]
     fn a_planar_polygon_keeps_its_area() {
         // A star with reflex corners: area is least where nothing overlaps.
-        let points: Vec<DVec3> = (0..16)
-            .map(|i| ([1.0, 0.4][i % 2] * DVec2::from_angle(TAU * i as f64 / 16.0)).extend(0.0))
-            .collect();
+        let points: Vec<DVec3> =
+            (0..16).map(|i| ([1.0, 0.4][i % 2] * DVec2::from_angle(TAU * i as f64 / 16.0)).extend(0.0)).collect();
         let mesh = Mesh { points: points.clone(), ..Mesh::default() };
         let rim: Vec<u32> = (0..16).collect();
         let triangles = span(&Topology::new(&mesh), &rim, &BTreeSet::new()).unwrap();
         assert_eq!(triangles.len(), 14);
-        let area = |[a, b, c]: [u32; 3]| 0.5 * (points[b as usize] - points[a as usize]).cross(points[c as usize] - points[a as usize]).z;
+        let area = |[a, b, c]: [u32; 3]| {
+            0.5 * (points[b as usize] - points[a as usize]).cross(points[c as usize] - points[a as usize]).z
+        };
         let expected = 8.0 * 0.4 * (TAU / 16.0).sin();
         assert!((triangles.iter().map(|&t| area(t)).sum::<f64>() - expected).abs() < 1e-12);
         assert!(triangles.iter().all(|&t| area(t) > 0.0));
