@@ -38,36 +38,35 @@ pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
             "bytes": bytes,
             "vertices": healed.mesh.points.len(),
             "faces": healed.mesh.faces.len(),
-            "before": as_json(&healed.before, options.check_intersections),
-            "after": as_json(&healed.after, options.check_intersections),
+            "before": as_json(&healed.before),
+            "after": as_json(&healed.after),
             "steps": healed.steps.iter().map(|s| json!({ "name": s.name, "count": s.count, "undone": s.is_undone }))
                 .collect::<Vec<_>>(),
         });
         print::out(&format!("{told}\n"))?;
     } else {
         let written = convert::told(&args.out, &healed.mesh, bytes);
-        print::out(&format!("{}{written}\n{}\n", table(&healed, options.check_intersections), verdict(&healed)))?;
+        print::out(&format!("{}{written}\n{}\n", table(&healed), verdict(&healed)))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(defects: &Defects, with_crossings: bool) -> Value {
+fn as_json(defects: &Defects) -> Value {
     let mut object: Map<String, Value> =
         defects.counts()[..11].iter().map(|(name, n)| (name.replace([' ', '-'], "_"), json!(n))).collect();
-    let most = Defects::MOST as u64 + 1;
-    let pairs = with_crossings.then(|| defects.self_intersections.unwrap_or(most));
-    object.insert("self_intersections".to_owned(), json!(pairs));
+    object.insert("self_intersections".to_owned(), json!(defects.self_intersections));
     Value::Object(object)
 }
 
-fn table(healed: &Healed, with_crossings: bool) -> String {
+fn table(healed: &Healed) -> String {
     let mut table = Table::default();
     let (before, after) = (healed.before.counts(), healed.after.counts());
     let found: Vec<usize> = (0..11).filter(|&i| before[i].1 + after[i].1 > 0).collect();
+    let most = Defects::MOST as u64;
     let words = |defects: &Defects| {
-        defects.self_intersections.map_or_else(|| format!("over {}", count(Defects::MOST as u64)), count)
+        defects.self_intersections.map(|n| if n > most { format!("over {}", count(most)) } else { count(n) })
     };
-    let crosses = with_crossings && [&healed.before, &healed.after].iter().any(|d| d.self_intersections != Some(0));
+    let crosses = [&healed.before, &healed.after].iter().any(|d| d.self_intersections.is_some_and(|n| n > 0));
     if !found.is_empty() || crosses {
         table.line("", &["before", "after"].map(|name| Some(name.to_owned())));
     }
@@ -75,7 +74,7 @@ fn table(healed: &Healed, with_crossings: bool) -> String {
         table.line(before[i].0, &[before[i].1, after[i].1].map(|n| Some(count(n))));
     }
     if crosses {
-        table.line("self-intersections", &[&healed.before, &healed.after].map(|d| Some(words(d))));
+        table.line("self-intersections", &[&healed.before, &healed.after].map(words));
     }
     let mut text = table.to_string();
     for step in &healed.steps {

@@ -46,11 +46,11 @@ type Corners = Box<[PointId]>;
 /// A mesh under change.
 ///
 /// ```
-/// use zmend::mesh::{Edit, sample};
+/// use zmend::mesh::{Edit, PointId, sample};
 ///
 /// let ball = sample::build("sphere", 1)?;
 /// let mut edit = Edit::new(&ball)?;
-/// let [a, b] = [edit.face(edit.faces().next().unwrap()).unwrap()[0], edit.face(edit.faces().next().unwrap()).unwrap()[1]];
+/// let [a, b] = [0, 1].map(|corner| PointId(ball.faces.get(0)[corner]));
 /// let middle = edit.split_edge(a, b, 0.5)?;
 /// edit.collapse_edge(a, middle)?;
 /// edit.undo();

