@@ -1,4 +1,4 @@
-//! Indexed polygons, and what can be said about them.
+//! Indexed polygons: what can be said about them, and what can be done to them.
 
 pub(crate) mod chance;
 mod corners;

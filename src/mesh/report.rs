@@ -91,7 +91,7 @@ impl Mesh {
     /// face that runs along an edge and straight back uses it twice. A *fan* is a set of corners at one point that hang
     /// together by edges. Lengths, areas and volumes leave out what has points that are not finite.
     ///
-    /// About 15 bytes and 60 ns a corner on one thread, 35 ns on two.
+    /// About 7 bytes a corner, 11 where faces differ in their numbers of corners; 60 ns on one thread, 35 ns on two.
     /// The result does not depend on the number of threads.
     ///
     /// ```
