@@ -21,7 +21,7 @@
 //!   and a step that made any count worse is undone. So no count is ever worse in the end, and a step may still make a hole that a
 //!   later one fills.
 //! - A mesh without defects is returned as it was, bit for bit; and a face with all its points, where no step had to touch it.
-//! - Results depend neither on the number of threads nor, but for the numbers of points and faces, on the order of the input.
+//! - Results do not depend on the number of threads, and which points are welded not on their order.
 //!
 //! # Cost
 //!
