@@ -268,7 +268,8 @@ mod tests {
         };
         assert_eq!(marked("torus"), [0; 3]);
         let [open, doubled, crossing] = ["knot-holes", "doubled", "overlap"].map(marked);
-        assert!(open[0] > 100 && open[1] + open[2] == 0, "{open:?}");
+        // Green over the red behind is a little yellow where they meet.
+        assert!(open[0] > 500 && open[1] == 0 && open[2] < 100, "{open:?}");
         assert!(doubled[1] > 1000 && crossing[2] > 1000 && crossing[0] == 0, "{doubled:?} {crossing:?}");
     }
 
