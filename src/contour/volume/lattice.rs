@@ -86,6 +86,13 @@ impl<'a, V: Volume> Lattice<'a, V> {
         self.placement.to_model(place)
     }
 
+    /// The steps from a lattice point to the next one along x, y and z, in model units.
+    #[inline]
+    pub(crate) fn steps(&self) -> [DVec3; 3] {
+        let axes = &self.placement.axes;
+        [axes.x_axis, axes.y_axis, axes.z_axis]
+    }
+
     /// Whether faces made on the lattice have to be turned over in the model.
     pub(crate) fn is_mirrored(&self) -> bool {
         self.placement.is_mirrored()
