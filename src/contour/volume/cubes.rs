@@ -78,13 +78,10 @@ impl<V: Volume> Extractor for Cubes<'_, V> {
         let Some(next) = self.slices.get(z + 1) else { return };
         let (slices, firsts) = ([slice, next], [first(z), first(z + 1)]);
         let mut masks = slice.masks().iter();
+        let mut row = None;
         for y in 0..slice.rows() {
-            if y == 0 {
-                window.start(slices, firsts, y);
-            } else {
-                window.advance(slices, firsts, y);
-            }
-            for word in slice.row(y) {
+            for word in slice.row(y).iter().filter(|word| word.mixed != 0) {
+                window.go_to(&mut row, slices, firsts, y);
                 let start = 64 * word.x as usize;
                 for (x, &mask) in Bits(word.mixed).zip(&mut masks) {
                     let number = window.at(start + x as usize);

@@ -59,6 +59,11 @@ impl<'a, V: Volume> Lattice<'a, V> {
         }
     }
 
+    /// How far a lattice point is inside; in the border, one unit outside.
+    pub(crate) fn depth(&self, at: [usize; 3]) -> f64 {
+        self.sample(at).map_or(-1.0, |at| self.level.depth(self.volume.value(at)))
+    }
+
     /// The cells of a row that may hold surface, among them those of the border; none where there is no row.
     pub(crate) fn valid_cells(&self, y: Option<usize>, z: Option<usize>, words: &mut [u64]) {
         let (Some(y), Some(z)) = (y, z) else { return words.fill(0) };

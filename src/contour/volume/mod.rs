@@ -13,6 +13,7 @@
 //! | `run` | numbers points and faces slice by slice and passes them on in order |
 //! | `window` | the numbers of the points round a row of cells, kept in the first cache |
 //! | `cubes` | marching cubes |
+//! | `trilinear` | marching cubes with the topology of the trilinear interpolant |
 //!
 //! # What holds
 //!
@@ -30,6 +31,7 @@ mod slice;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod trilinear;
 mod window;
 
 use crate::error::{Error, Result};
@@ -45,6 +47,9 @@ pub enum Method {
     /// Marching cubes: one point on each crossed edge, inside samples joined along edges only. Closed and manifold for all signs.
     #[default]
     MarchingCubes,
+    /// Marching cubes with the topology of the trilinear interpolant of the samples ("Marching cubes 33"): where signs alone leave open what
+    /// is joined, their values decide. Closed and manifold for all values.
+    Trilinear,
 }
 
 /// What happens where the surface leaves the volume.
@@ -116,5 +121,6 @@ pub fn extract<V: Volume>(
     let slices = run::walk(&lattice, progress)?;
     match options.method {
         Method::MarchingCubes => run::pass_on(&cubes::Cubes::new(&lattice, &slices), &slices, sink, progress),
+        Method::Trilinear => run::pass_on(&trilinear::Trilinear::new(&lattice, &slices), &slices, sink, progress),
     }
 }

@@ -27,14 +27,19 @@ fn surface(values: &[f32], size: [usize; 3], options: &ExtractOptions) -> Mesh {
     mesh
 }
 
+const METHODS: [Method; 2] = [Method::MarchingCubes, Method::Trilinear];
+
 #[test]
 fn random_volumes_have_closed_surfaces() {
     for (kind, seed) in (0..KINDS.len()).flat_map(|kind| (0..4).map(move |seed| (kind, seed))) {
         let size = [[24, 24, 24], [62, 5, 7], [63, 3, 3], [130, 4, 2]][seed as usize];
-        let mesh = surface(&random(kind, size, seed), size, &ExtractOptions::default());
-        assert_eq!(mesh.validate(), Ok(()), "kind {kind}, seed {seed}");
-        let report = mesh.report();
-        assert_eq!((report.zero_area_faces, report.isolated_points), (0, 0));
-        assert!(mesh.outward() && report.faces > 100);
+        let values = random(kind, size, seed);
+        for method in METHODS {
+            let mesh = surface(&values, size, &ExtractOptions { method, ..ExtractOptions::default() });
+            assert_eq!(mesh.validate(), Ok(()), "{method:?}, kind {kind}, seed {seed}");
+            let report = mesh.report();
+            assert_eq!((report.zero_area_faces, report.isolated_points), (0, 0), "{method:?}, kind {kind}, seed {seed}");
+            assert!(mesh.outward() && report.faces > 100);
+        }
     }
 }
