@@ -37,7 +37,7 @@ impl<'a, V: Volume> Lattice<'a, V> {
 
     /// The lattice point of the volume, if it is no virtual one.
     #[inline]
-    fn sample(&self, at: [usize; 3]) -> Option<[usize; 3]> {
+    pub(crate) fn sample(&self, at: [usize; 3]) -> Option<[usize; 3]> {
         let at = at.map(|c| c.wrapping_sub(self.border));
         let size = self.volume.size();
         (at[0] < size[0] && at[1] < size[1] && at[2] < size[2]).then_some(at)

@@ -14,6 +14,9 @@
 //! | `window` | the numbers of the points round a row of cells, kept in the first cache |
 //! | `cubes` | marching cubes |
 //! | `trilinear` | marching cubes with the topology of the trilinear interpolant |
+//! | `polygons` | the cases as polygons, of which dual surfaces have vertices |
+//! | `tangents`, `cell_points` | tangent planes, and where vertices in cells go |
+//! | `rows`, `dual` | dual contouring and surface nets |
 //!
 //! # What holds
 //!
@@ -24,11 +27,16 @@
 //! - Memory is that of the signs of two slices for each thread, and a few bytes for each face while it is made.
 //! - The same volume gives the same bytes on any number of threads.
 
+mod cell_points;
 mod cubes;
+mod dual;
 mod lattice;
+mod polygons;
+mod rows;
 mod run;
 mod slice;
 mod sweep;
+mod tangents;
 #[cfg(test)]
 mod tests;
 mod trilinear;
@@ -50,6 +58,11 @@ pub enum Method {
     /// Marching cubes with the topology of the trilinear interpolant of the samples ("Marching cubes 33"): where signs alone leave open what
     /// is joined, their values decide. Closed and manifold for all values.
     Trilinear,
+    /// Dual contouring: one point for each sheet of the surface in a cell, where its tangent planes meet, so that sharp edges and corners are
+    /// kept. Closed and manifold for all signs.
+    DualContouring,
+    /// Surface nets: as dual contouring, with points in the middle of the crossings.
+    SurfaceNets,
 }
 
 /// What happens where the surface leaves the volume.
@@ -122,5 +135,9 @@ pub fn extract<V: Volume>(
     match options.method {
         Method::MarchingCubes => run::pass_on(&cubes::Cubes::new(&lattice, &slices), &slices, sink, progress),
         Method::Trilinear => run::pass_on(&trilinear::Trilinear::new(&lattice, &slices), &slices, sink, progress),
+        Method::DualContouring | Method::SurfaceNets => {
+            let dual = dual::Dual::new(&lattice, &slices, options.method == Method::DualContouring, progress)?;
+            run::pass_on(&dual, &slices, sink, progress)
+        }
     }
 }
