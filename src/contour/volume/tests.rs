@@ -35,7 +35,13 @@ fn cells(size: usize, field: impl Fn(DVec3) -> f64 + Sync, method: Method) -> Me
     mesh
 }
 
-const METHODS: [Method; 4] = [Method::MarchingCubes, Method::Trilinear, Method::DualContouring, Method::SurfaceNets];
+const METHODS: [Method; 5] = [
+    Method::MarchingCubes,
+    Method::Trilinear,
+    Method::DualContouring,
+    Method::SurfaceNets,
+    Method::ExtendedMarchingCubes,
+];
 
 #[test]
 fn random_volumes_have_closed_surfaces() {
@@ -80,7 +86,7 @@ fn farthest(mesh: &Mesh, points: &[DVec3]) -> (f64, f64) {
 
 #[test]
 fn sharp_edges_and_corners_are_kept() {
-    for method in [Method::DualContouring] {
+    for method in [Method::DualContouring, Method::ExtendedMarchingCubes] {
         let (field, features) = turned_cube(9.3, 15.6);
         let (mean, worst) = farthest(&cells(32, field, method), &features);
         assert!(worst < 0.1 && mean < 0.01, "{method:?}: {mean} {worst}");
