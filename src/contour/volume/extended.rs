@@ -7,8 +7,8 @@
 //! Kobbelt's rule tells edges from corners, and that gives the true rank of the planes: on an edge, the vertex is solved for across the
 //! edge only ([`feature`]). Vertices stay in their cell, unless all planes meet just beyond, as in dual contouring.
 //!
-//! Flips ask for no search after the fact: whoever makes the triangles beside a segment looks at both of its cells. Segments of open faces
-//! are not flipped, where two cycles can have two segments in common, nor those whose new triangles would have no area.
+//! Flips ask for no search after the fact: whoever makes the triangles beside a segment looks at both of its cells. Segments are not flipped
+//! where two cycles have two of them in common, on an open face, nor if the new triangles would have no area.
 
 use super::cell_points::{CellPoint, Kind, STEPS, place_all};
 use super::cubes::edge_points;
@@ -51,8 +51,22 @@ struct Segment {
     to: Edge,
     /// Its cycle in the list.
     cycle: Option<u8>,
-    /// Whether it may be flipped: it is alone on its face.
-    flips: bool,
+}
+
+impl Cycles {
+    /// Whether a cycle passes through a face twice.
+    fn passes_twice(&self, face: Face, cycle: u8) -> bool {
+        self.starts[face.index()].iter().filter(|&&c| c == Some(cycle)).count() == 2
+    }
+}
+
+/// The vertex of a feature beside a segment.
+struct Vertex {
+    number: u32,
+    /// Where it is on the lattice.
+    at: DVec3,
+    /// Whether its cycle has another segment on the same face.
+    passes_twice: bool,
 }
 
 static CYCLES: LazyLock<Vec<Cycles>> = LazyLock::new(|| CASES.iter().map(cycles).collect());
@@ -74,8 +88,7 @@ fn cycles(case: &Case) -> Cycles {
         for (&from, &to) in cycle.iter().zip(cycle.iter().cycle().skip(1)) {
             let face = from.faces().into_iter().find(|face| to.faces().contains(face)).expect("segments lie on faces");
             let cycle = (!has_tunnel).then_some(i);
-            let crossed = case.cycles.iter().flatten().filter(|edge| edge.faces().contains(&face)).count();
-            cycles.segments.push(Segment { face, from, to, cycle, flips: crossed == 2 });
+            cycles.segments.push(Segment { face, from, to, cycle });
             cycles.starts[face.index()][from.index()] = cycle;
         }
     }
@@ -159,12 +172,19 @@ impl<'a, V: Volume> Extended<'a, V> {
         place(start) + self.lattice.crossing(start, edge.axis()) * DVec3::AXES[edge.axis().index()]
     }
 
-    /// The number and place of the feature of a cycle of the cell at `at`.
-    fn vertex(&self, at: [usize; 3], cell: Seen, cycle: u8, first: impl Fn(usize) -> u32) -> Option<(u32, DVec3)> {
+    /// The vertex of a cycle of the cell at `at`, seen from a face.
+    fn vertex(
+        &self,
+        at: [usize; 3],
+        cell: Seen,
+        (face, cycle): (Face, u8),
+        first: impl Fn(usize) -> u32,
+    ) -> Option<Vertex> {
         let z = at[2];
         let point = self.feature(z, cell, cycle)?;
         let rank = self.ranks[z][cell.first as usize + usize::from(cycle)];
-        Some((first(z) + self.slices[z].edges() + rank, point.place(at)))
+        let passes_twice = self.cycles_of(cell.mask).passes_twice(face, cycle);
+        Some(Vertex { number: first(z) + self.slices[z].edges() + rank, at: point.place(at), passes_twice })
     }
 
     /// The same for the cycle beyond a segment on a face that a cell shares with one before it. The cells are those of `rows`.
@@ -174,7 +194,7 @@ impl<'a, V: Volume> Extended<'a, V> {
         mut at: [usize; 3],
         segment: Segment,
         first: impl Fn(usize) -> u32,
-    ) -> Option<(u32, DVec3)> {
+    ) -> Option<Vertex> {
         let axis = segment.face.axis();
         at[axis.index()] -= 1;
         let cell = match axis {
@@ -185,8 +205,9 @@ impl<'a, V: Volume> Extended<'a, V> {
         // Seen from there, it runs the other way.
         let [low, high] = segment.to.corners().map(|corner| corner.across(axis));
         let edge = Edge::between(low, high).expect("across the cell from an edge is an edge");
-        let cycle = self.cycles_of(cell.mask).starts[Face::new(axis, true).index()][edge.index()]?;
-        self.vertex(at, cell, cycle, first)
+        let face = Face::new(axis, true);
+        let cycle = self.cycles_of(cell.mask).starts[face.index()][edge.index()]?;
+        self.vertex(at, cell, (face, cycle), first)
     }
 
     /// Appends the triangles of features beside the segments of a cell: on faces that it shares with cells before it those of both cells, and on
@@ -209,20 +230,18 @@ impl<'a, V: Volume> Extended<'a, V> {
             if segment.face.is_high() && !is_alone {
                 continue;
             }
-            let here = segment.cycle.and_then(|cycle| self.vertex(at, cell, cycle, &first));
+            let here = segment.cycle.and_then(|cycle| self.vertex(at, cell, (segment.face, cycle), &first));
             let there = if is_alone { None } else { self.vertex_before(rows, at, segment, &first) };
             let [p, q] = [segment.from, segment.to].map(|edge| number(edge.index() as u8));
             match (here, there) {
-                (Some((f, at_f)), Some((g, at_g))) => {
+                (Some(f), Some(g)) => {
                     let [at_p, at_q] = [segment.from, segment.to].map(|edge| self.crossing(at, edge));
-                    if segment.flips && has_area([at_p, at_g, at_f]) && has_area([at_g, at_q, at_f]) {
-                        out.extend([p, g, f, g, q, f]);
-                    } else {
-                        out.extend([p, q, f, q, p, g]);
-                    }
+                    let has_area = has_area([at_p, g.at, f.at]) && has_area([g.at, at_q, f.at]);
+                    let (f, g, is_twin) = (f.number, g.number, f.passes_twice && g.passes_twice);
+                    out.extend(if has_area && !is_twin { [p, g, f, g, q, f] } else { [p, q, f, q, p, g] });
                 }
-                (Some((f, _)), None) => out.extend([p, q, f]),
-                (None, Some((g, _))) => out.extend([q, p, g]),
+                (Some(f), None) => out.extend([p, q, f.number]),
+                (None, Some(g)) => out.extend([q, p, g.number]),
                 (None, None) => {}
             }
         }
