@@ -74,6 +74,11 @@ impl CellPoint {
     }
 }
 
+/// Bytes held by the vertices of slices.
+pub(super) fn bytes(points: &[Vec<CellPoint>]) -> u64 {
+    points.iter().map(|points| size_of_val(&points[..]) as u64).sum()
+}
+
 /// What a thread reuses from slice to slice.
 pub(super) struct Scratch {
     window: Window,
@@ -91,11 +96,8 @@ pub(super) fn place_all<V: Volume>(
     solve: impl Fn(&Planes, bool) -> CellPoint + Sync,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<CellPoint>>> {
-    let scratch = || Scratch {
-        window: Window::new(lattice.size[0]),
-        tangents: Tangents::default(),
-        planes: Planes::default(),
-    };
+    let scratch =
+        || Scratch { window: Window::new(lattice.size[0]), tangents: Tangents::default(), planes: Planes::default() };
     let to_unit = lattice.unit_normals();
     let place = |Scratch { window, tangents, planes }: &mut Scratch, z: usize| {
         let slice = &slices[z];

@@ -15,7 +15,7 @@ use super::lattice::Lattice;
 use super::polygons::{self, Polygons};
 use super::rows::{CELLS, CellRows, Seen};
 use super::run::{Extractor, in_parallel};
-use super::slice::Slice;
+use super::slice::{Slice, bytes};
 use super::tangents::Planes;
 use crate::error::Result;
 use crate::grid::brick::Bits;
@@ -61,6 +61,7 @@ impl<'a, V: Volume> Dual<'a, V> {
             let solve = |planes: &Planes, _| CellPoint::new(planes.middle(), Kind::Smooth);
             place_all(lattice, slices, of_mask, false, solve, progress)?
         };
+        progress.hold(bytes(slices) + super::cell_points::bytes(&points))?;
         let mut dual = Dual { lattice, slices, points, polygons };
         if sharp {
             dual.separate(progress)?;
@@ -147,7 +148,8 @@ impl<'a, V: Volume> Dual<'a, V> {
                     let edges = word.crossed[axis.index()] & rows.complete(axis, word.x as usize);
                     for x in Bits(edges) {
                         let x = 64 * word.x as usize + x as usize;
-                        let mut cells = CELLS[axis.index()].map(|(back, row, edge)| (back, rows.at(row, x - back[0]), edge));
+                        let mut cells =
+                            CELLS[axis.index()].map(|(back, row, edge)| (back, rows.at(row, x - back[0]), edge));
                         // The first cell is the edge's own: its least corner is where the edge starts.
                         if cells[0].1.mask & 1 == 0 {
                             cells.swap(1, 3);
@@ -166,7 +168,8 @@ impl<'a, V: Volume> Dual<'a, V> {
 
     /// Number of corners of the face of an edge.
     fn corners(&self, cells: &[([usize; 3], Seen, Edge); 4]) -> usize {
-        let around = |&(_, seen, edge): &(_, Seen, Edge)| self.polygons[usize::from(seen.mask)].around[edge.index()].len();
+        let around =
+            |&(_, seen, edge): &(_, Seen, Edge)| self.polygons[usize::from(seen.mask)].around[edge.index()].len();
         cells.iter().map(around).sum()
     }
 }

@@ -16,7 +16,7 @@ use super::feature::{Sharpness, feature};
 use super::lattice::{Lattice, place};
 use super::rows::{CellRows, Seen};
 use super::run::Extractor;
-use super::slice::Slice;
+use super::slice::{Slice, bytes};
 use super::tangents::Planes;
 use super::window::Window;
 use crate::error::Result;
@@ -72,7 +72,8 @@ struct Vertex {
 static CYCLES: LazyLock<Vec<Cycles>> = LazyLock::new(|| CASES.iter().map(cycles).collect());
 
 fn cycles(case: &Case) -> Cycles {
-    let numbers = |triangles: &[[Edge; 3]]| triangles.as_flattened().iter().map(|e| e.index() as u8).collect::<Vec<_>>();
+    let numbers =
+        |triangles: &[[Edge; 3]]| triangles.as_flattened().iter().map(|e| e.index() as u8).collect::<Vec<_>>();
     let corners: usize = case.cycles.iter().map(Vec::len).sum();
     let mut cycles = Cycles::default();
     // Discs have two triangles less than corners; a tunnel has as many.
@@ -127,6 +128,8 @@ impl<'a, V: Volume> Extended<'a, V> {
             point.map_or_else(CellPoint::default, |point| CellPoint::new(point, Kind::Sharp))
         };
         let features = place_all(lattice, slices, |mask| &cycles[usize::from(mask)].list, true, solve, progress)?;
+        let of_ranks = features.iter().map(|points| (points.len() * size_of::<u32>()) as u64).sum::<u64>();
+        progress.hold(bytes(slices) + super::cell_points::bytes(&features) + of_ranks)?;
         let rank_all = |points: &Vec<CellPoint>| {
             let mut next = 0;
             let ranks = points.iter().map(|point| {
@@ -284,7 +287,13 @@ impl<V: Volume> Extractor for Extended<'_, V> {
         });
     }
 
-    fn triangles(&self, Scratch { window, rows }: &mut Scratch, z: usize, first: impl Fn(usize) -> u32, out: &mut Vec<u32>) {
+    fn triangles(
+        &self,
+        Scratch { window, rows }: &mut Scratch,
+        z: usize,
+        first: impl Fn(usize) -> u32,
+        out: &mut Vec<u32>,
+    ) {
         let Some(next) = self.slices.get(z + 1) else { return };
         let slice = &self.slices[z];
         let before = z.checked_sub(1).map(|z| &self.slices[z]);
