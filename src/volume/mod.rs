@@ -11,6 +11,7 @@
 //! | a function of the lattice point | [`Samples`] |
 //! | a continuous function of the place, of which surface and normals shall be exact | [`LevelSet`] |
 //! | a part of another volume | [`Cropped`] |
+//! | one of several materials, told apart by their numbers | [`Label`] |
 //!
 //! # Inside
 //!
@@ -25,10 +26,12 @@
 
 mod dense;
 mod field;
+mod label;
 mod placement;
 
 pub use dense::{Dense, Sample};
 pub use field::{Cropped, LevelSet, Samples};
+pub use label::Label;
 pub use placement::Placement;
 
 use crate::grid::Axis;
@@ -136,6 +139,17 @@ pub trait Volume: Sync {
         differences(self, place)
     }
 
+    /// Whether there are several [materials](Self::material).
+    fn has_materials(&self) -> bool {
+        false
+    }
+
+    /// The number of the material at a lattice point, of which one is inside. Surface nets have one place for all vertices in a cell, halfway
+    /// between the materials, so that the surfaces of all of them fit together. Only called if there [are any](Self::has_materials).
+    fn material(&self, at: [usize; 3]) -> f64 {
+        self.value(at)
+    }
+
     /// Whether [`valid_cells`](Self::valid_cells) leaves out any.
     fn has_invalid_cells(&self) -> bool {
         false
@@ -165,6 +179,12 @@ impl<V: Volume + ?Sized> Volume for &V {
     }
     fn gradient(&self, place: DVec3) -> DVec3 {
         (**self).gradient(place)
+    }
+    fn has_materials(&self) -> bool {
+        (**self).has_materials()
+    }
+    fn material(&self, at: [usize; 3]) -> f64 {
+        (**self).material(at)
     }
     fn has_invalid_cells(&self) -> bool {
         (**self).has_invalid_cells()

@@ -48,7 +48,7 @@ mod window;
 use crate::error::{Error, Result, Short};
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::progress::Progress;
-use crate::volume::{Level, Placement, Volume};
+use crate::volume::{Label, Level, Placement, Volume};
 use lattice::Lattice;
 
 /// How the surface is made.
@@ -157,4 +157,24 @@ pub fn extract<V: Volume>(
             run::pass_on(&extended, &slices, sink, progress)
         }
     }
+}
+
+/// Passes the surface of one material to `sink`, of a volume whose samples are numbers of materials: by surface nets, whatever level and
+/// method `options` say.
+///
+/// The surfaces of all materials fit together: where two of them touch, both have the same triangles, turned to either side, also along the lines
+/// where three or more meet. Only where a material touches itself along an edge or in a point, its surface keeps a 64th of a cell apart, so that
+/// it is a manifold.
+///
+/// # Errors
+/// As [`extract`].
+pub fn extract_label<V: Volume>(
+    labels: &V,
+    label: f64,
+    options: &ExtractOptions,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
+    let options = ExtractOptions { level: Label::<&V>::LEVEL, method: Method::SurfaceNets, ..*options };
+    extract(&Label::new(labels, label), &options, sink, progress)
 }
