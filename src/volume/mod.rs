@@ -199,19 +199,14 @@ impl<V: Volume + ?Sized> Volume for &V {
 fn differences<V: Volume + ?Sized>(volume: &V, place: DVec3) -> DVec3 {
     let size = volume.size();
     let low: [usize; 3] = std::array::from_fn(|a| (place[a].max(0.0) as usize).min(size[a].saturating_sub(1)));
+    let t: [f64; 3] = std::array::from_fn(|a| place[a] - low[a] as f64);
+    // The axes along which the place is between lattice points.
+    let between = (0..3).fold(0, |axes, a| axes | usize::from(t[a] > 0.0 && low[a] + 1 < size[a]) << a);
     let mut sum = DVec3::ZERO;
-    for corner in 0..8 {
-        let mut at = low;
-        let mut weight = 1.0;
-        for axis in 0..3 {
-            let t = place[axis] - low[axis] as f64;
-            let is_high = corner >> axis & 1 == 1;
-            weight *= if is_high { t } else { 1.0 - t };
-            at[axis] += usize::from(is_high);
-        }
-        if weight > 0.0 && (0..3).all(|a| at[a] < size[a]) {
-            sum += weight * difference_at(volume, at, size);
-        }
+    for corner in (0..8).filter(|corner| corner & !between == 0) {
+        let at: [usize; 3] = std::array::from_fn(|a| low[a] + (corner >> a & 1));
+        let weights = (0..3).filter(|a| between >> a & 1 == 1).map(|a| if at[a] > low[a] { t[a] } else { 1.0 - t[a] });
+        sum += weights.product::<f64>() * difference_at(volume, at, size);
     }
     sum
 }
