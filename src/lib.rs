@@ -104,6 +104,7 @@ pub mod repair;
 mod sets;
 pub mod sign;
 pub mod topology;
+pub mod volume;
 
 pub use error::{Error, Place, Result};
 /// The vectors of the public interface.

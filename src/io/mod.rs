@@ -50,6 +50,7 @@ mod stl;
 mod text;
 #[cfg(feature = "3mf")]
 mod threemf;
+pub mod volume;
 mod write;
 
 pub use encode::Precision;

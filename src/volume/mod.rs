@@ -1,0 +1,5 @@
+//! Volumes.
+
+pub mod image;
+
+pub use image::{Image, Placement, Voxels};
