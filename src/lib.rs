@@ -56,7 +56,8 @@
 //! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
-//! | [`contour`] | marching cubes and manifold dual contouring |
+//! | [`contour`] | marching cubes and manifold dual contouring; of volumes in [`contour::volume`] |
+//! | [`volume`] | scalar fields on a lattice: arrays, functions, parts |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
 //! | [`grid`] | keys, axes, corners, bricks of bits, the 256 cases: integers only |
 //! | [`geom`] | the frame of the grid, exact rasterisation, normals in 16 bits, quadratic error functions |

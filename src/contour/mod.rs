@@ -16,6 +16,7 @@ mod place;
 mod points;
 #[cfg(test)]
 mod tests;
+pub mod volume;
 
 pub use cubes::marching_cubes;
 pub use dual::{DualOptions, Intersections, Placement, dual_contouring};

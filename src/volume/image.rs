@@ -12,73 +12,13 @@
 //!
 //! The samples in their own type, nothing beside them.
 
-use crate::error::{Error, Result, Short};
+use super::{Dense, Level, Placement, Sample, Volume};
+use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Samples that are summed up at a time.
 const PIECE: usize = 1 << 16;
-
-/// Where the samples of a volume lie.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placement {
-    /// Where sample `(0, 0, 0)` lies, in model units.
-    pub origin: DVec3,
-    /// The steps from a sample to the next one along x, y and z, as columns, in model units.
-    pub axes: DMat3,
-}
-
-impl Default for Placement {
-    fn default() -> Self {
-        Placement { origin: DVec3::ZERO, axes: DMat3::IDENTITY }
-    }
-}
-
-impl Placement {
-    /// Samples along the axes of space, the given steps apart.
-    pub fn spaced(origin: DVec3, spacing: DVec3) -> Self {
-        Placement { origin, axes: DMat3::from_diagonal(spacing) }
-    }
-
-    /// From a position in samples to model space.
-    #[inline]
-    pub fn to_model(&self, at: DVec3) -> DVec3 {
-        self.origin + self.axes * at
-    }
-
-    /// The distances between samples along x, y and z.
-    pub fn spacing(&self) -> DVec3 {
-        DVec3::from(self.axes.to_cols_array_2d().map(|step| DVec3::from(step).length()))
-    }
-
-    /// The same directions with other distances between samples; sample `(0, 0, 0)` stays where it is.
-    #[must_use]
-    pub fn with_spacing(self, spacing: DVec3) -> Self {
-        let factors = spacing / self.spacing();
-        Placement { axes: self.axes * DMat3::from_diagonal(factors), ..self }
-    }
-
-    /// Whether the lattice is mirrored: x, y, z of the samples are then left-handed.
-    pub fn is_mirrored(&self) -> bool {
-        self.axes.determinant() < 0.0
-    }
-
-    /// Whether samples have places of their own.
-    ///
-    /// # Errors
-    /// When a number is not finite, or the steps lie in a plane.
-    pub fn check(&self) -> Result<()> {
-        // Relative to the lengths of the steps, this is the sine of the angle between a step and the plane of the others.
-        let spacing = self.spacing();
-        let flatness = self.axes.determinant().abs() / (spacing.x * spacing.y * spacing.z);
-        if self.origin.is_finite() && flatness.is_finite() && flatness > 1e-6 {
-            return Ok(());
-        }
-        let [x, y, z] = spacing.to_array().map(Short);
-        let problem = format!("steps of {x}, {y} and {z} units from sample to sample do not span space");
-        Err(Error::setting("spacing", problem, "give the distances between samples along x, y and z"))
-    }
-}
 
 /// Samples, in the type they come in.
 ///
@@ -206,7 +146,7 @@ impl Range {
 /// A volume: samples and where they lie.
 ///
 /// ```
-/// use zmend::volume::{Image, Placement, Voxels};
+/// use zmend::volume::{Image, Placement, Volume, Voxels};
 ///
 /// let image = Image::new([3, 2, 1], Placement::default(), Voxels::U8(vec![0, 1, 2, 3, 4, 5]))?;
 /// assert_eq!(image.value([1, 1, 0]), 4.0);
@@ -260,18 +200,20 @@ impl Image {
         Ok(Image { placement, ..self })
     }
 
+    /// The same samples in the same directions, so far apart; the first one stays where it is.
+    ///
+    /// # Errors
+    /// As [`Placement::check`].
+    pub fn with_spacing(self, spacing: DVec3) -> Result<Self> {
+        let placement = self.placement;
+        let axes = placement.axes * DMat3::from_diagonal(spacing / placement.spacing());
+        self.placed(Placement { axes, ..placement })
+    }
+
     /// The place of a sample among the voxels.
     #[inline]
     pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.size[1] + y) * self.size[0] + x
-    }
-
-    /// A sample.
-    ///
-    /// # Panics
-    /// When there is none.
-    pub fn value(&self, at: [usize; 3]) -> f64 {
-        self.voxels.value(self.index(at))
     }
 
     /// The corners of the box of the samples, in model units.
@@ -281,6 +223,27 @@ impl Image {
             let end = |a: usize| if at[a] { (self.size[a] - 1) as f64 } else { 0.0 };
             self.placement.to_model(DVec3::new(end(0), end(1), end(2)))
         })
+    }
+}
+
+/// The samples of one type.
+fn dense<T: Sample>(samples: &[T], size: [usize; 3]) -> Dense<'_, T> {
+    Dense::new(samples, size).expect("images have as many voxels as their size says")
+}
+
+/// What is asked for rows is done in the type of the samples, with one look at what that is.
+impl Volume for Image {
+    fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    #[inline]
+    fn value(&self, at: [usize; 3]) -> f64 {
+        self.voxels.value(self.index(at))
+    }
+
+    fn signs(&self, row: [usize; 2], level: Level, words: &mut [u64]) {
+        with_samples!(&self.voxels, samples => dense(samples, self.size).signs(row, level, words));
     }
 }
 
@@ -297,22 +260,27 @@ mod tests {
         assert!(Image::new([usize::MAX, usize::MAX, 2], Placement::default(), voxels()).is_err());
         assert!(Image::new([0, 2, 1], Placement::default(), Voxels::U8(Vec::new())).is_err());
         for spacing in [DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, f64::NAN, 1.0), DVec3::splat(f64::INFINITY)] {
-            let message = image.clone().placed(Placement::spaced(DVec3::ZERO, spacing)).unwrap_err().to_string();
-            assert!(message.starts_with("spacing: steps of 1") || message.contains("inf"), "{message}");
+            let message = image.clone().placed(Placement::with_spacing(DVec3::ZERO, spacing)).unwrap_err().to_string();
+            assert!(message.contains("--spacing"), "{message}");
         }
     }
 
     #[test]
-    fn placements_hold_flips_and_oblique_axes() {
+    fn images_are_volumes() {
         let axes = DMat3::from_cols(DVec3::new(0.0, 2.0, 0.0), DVec3::new(3.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 4.0));
         let placement = Placement { origin: DVec3::ONE, axes };
-        assert!(placement.is_mirrored());
-        assert_eq!(placement.spacing(), DVec3::new(2.0, 3.0, 4.0));
-        assert_eq!(placement.to_model(DVec3::new(1.0, 1.0, 1.0)), DVec3::new(4.0, 3.0, 5.0));
-        let finer = placement.with_spacing(DVec3::splat(1.0));
-        assert_eq!(finer.to_model(DVec3::new(1.0, 0.0, 0.0)), DVec3::new(1.0, 2.0, 1.0));
-        let image = Image::new([2, 1, 3], placement, Voxels::U8(vec![0; 6])).unwrap();
+        let image = Image::new([2, 1, 3], placement, Voxels::U16(vec![0, 1, 2, 3, 4, 5])).unwrap();
         assert_eq!(image.corners()[7], DVec3::new(1.0, 3.0, 9.0));
+        let finer = image.clone().with_spacing(DVec3::splat(1.0)).unwrap();
+        assert_eq!(finer.placement().to_model(DVec3::ONE), DVec3::splat(2.0));
+        let mut words = [0];
+        let rows = [0, 1, 2].map(|z| {
+            image.signs([0, z], Level::above(2.5), &mut words);
+            words[0]
+        });
+        assert_eq!(rows, [0, 0b10, 0b11]);
+        assert_eq!(Volume::value(&image, [1, 0, 2]), 5.0);
+        assert_eq!(image.gradient(DVec3::new(0.5, 0.0, 1.0)), DVec3::new(1.0, 0.0, 2.0));
     }
 
     #[test]

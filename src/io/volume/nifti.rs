@@ -126,7 +126,7 @@ fn placement(header: &Header<'_>) -> Placement {
     // Samples that are said to be nowhere apart are one unit apart.
     let spacing = DVec3::from([x, y, z].map(|step| if step.abs() > 0.0 { step.abs() } else { 1.0 }));
     if header.short(252) <= 0 {
-        return Placement::spaced(DVec3::ZERO, spacing);
+        return Placement::with_spacing(DVec3::ZERO, spacing);
     }
     let [b, c, d] = header.floats::<3>(256);
     let a = (1.0 - (b * b + c * c + d * d)).max(0.0).sqrt();

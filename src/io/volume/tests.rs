@@ -78,7 +78,7 @@ fn nrrd_files_are_read() {
     let options = VolumeOptions { channel: Some(1), ..VolumeOptions::default() };
     let file = read_volume_bytes("t", plain, &options, &Silent).unwrap();
     assert_eq!((file.image.size(), file.image.voxels()), ([3, 1, 2], &Voxels::U8(vec![1, 3, 5, 7, 9, 11])));
-    let expected = Placement::spaced(DVec3::new(2.0, 3.0, 3.0), DVec3::splat(2.0));
+    let expected = Placement::with_spacing(DVec3::new(2.0, 3.0, 3.0), DVec3::splat(2.0));
     assert_eq!(file.image.placement(), expected);
 }
 
@@ -111,7 +111,7 @@ fn nifti_files_are_read() {
         bytes.extend(data(big));
         // Method 1: nothing but distances.
         let plain = read(&bytes).unwrap().image;
-        assert_eq!(plain.placement(), Placement::spaced(DVec3::ZERO, DVec3::new(2.0, 0.5, 4.0)));
+        assert_eq!(plain.placement(), Placement::with_spacing(DVec3::ZERO, DVec3::new(2.0, 0.5, 4.0)));
         assert_eq!(plain.voxels(), image().voxels());
         // Method 2: a quarter of a turn round z.
         bytes[252..254].copy_from_slice(&code(1));
@@ -143,7 +143,7 @@ fn older_vtk_files_are_read() {
                 ORIGIN 1 -2 .1\nPOINT_DATA 12\nSCALARS values short 1\nLOOKUP_TABLE default\n";
     let file = read(&[head.as_bytes(), &data(true)].concat()).unwrap();
     assert_eq!(file.image.voxels(), image().voxels());
-    assert_eq!(file.image.placement(), Placement::spaced(placement().origin, DVec3::new(2.0, 0.5, 4.0)));
+    assert_eq!(file.image.placement(), Placement::with_spacing(placement().origin, DVec3::new(2.0, 0.5, 4.0)));
     let text = numbers().iter().map(i16::to_string).collect::<Vec<_>>().join(" ");
     let ascii = head.replace("BINARY", "ASCII").replace("POINT_DATA", "CELL_DATA").replace("3 2 2", "4 3 3") + &text;
     let file = read(ascii.as_bytes()).unwrap();
@@ -229,7 +229,7 @@ fn malformed_headers_say_where() {
     );
     assert!(meta("3 2 2", "3 2 x").contains("line 3: expected whole numbers"));
     assert!(meta("2 .5 4", "2 .5").contains("line 4: expected 3 numbers"));
-    assert!(meta("2 .5 4", "2 0 4").contains("do not span space"));
+    assert!(meta("2 .5 4", "2 0 4").contains("do not span a space"));
     assert!(meta("MET_SHORT", "MET_STRING").contains("line 7: expected a type"));
     assert!(meta("3 2 2", "0 2 2").contains("is none that a volume can have"));
     // Sizes that no file has are refused before anything is allocated.

@@ -1,0 +1,113 @@
+//! Marching cubes (Lorensen and Cline 1987) by the derived cases: closed and manifold for all signs.
+//!
+//! Points are numbered as the crossed edges are, and the triangles of a cell follow from the signs of its corners.
+
+use super::lattice::{Lattice, place};
+use super::run::Extractor;
+use super::slice::Slice;
+use super::window::Window;
+use crate::grid::brick::Bits;
+use crate::grid::cases::{CASES, Mask};
+use crate::grid::{Axis, Edge};
+use crate::volume::Volume;
+use glam::DVec3;
+
+/// The triangles of all cases, as edges of the cell.
+pub(super) struct Triangles {
+    /// Those of case m are at `starts[m] .. starts[m + 1]`.
+    edges: Vec<u8>,
+    starts: [u16; 257],
+}
+
+impl Triangles {
+    /// Counter-clockwise seen from outside, or clockwise if they are `turned`.
+    pub(super) fn new(turned: bool) -> Self {
+        let mut triangles = Triangles { edges: Vec::new(), starts: [0; 257] };
+        for (case, end) in CASES.iter().zip(1..) {
+            for [a, b, c] in case.triangles.iter().map(|t| t.map(|e: Edge| e.index() as u8)) {
+                triangles.edges.extend(if turned { [a, c, b] } else { [a, b, c] });
+            }
+            triangles.starts[end] = triangles.edges.len() as u16;
+        }
+        triangles
+    }
+
+    /// The corners of the triangles of a case, three for each.
+    #[inline]
+    pub(super) fn of(&self, mask: Mask) -> &[u8] {
+        let [start, end] = [0, 1].map(|i| usize::from(self.starts[usize::from(mask) + i]));
+        &self.edges[start..end]
+    }
+}
+
+/// Marching cubes over the slices of a lattice.
+pub(super) struct Cubes<'a, V> {
+    lattice: &'a Lattice<'a, V>,
+    slices: &'a [Slice],
+    triangles: Triangles,
+}
+
+impl<'a, V: Volume> Cubes<'a, V> {
+    pub(super) fn new(lattice: &'a Lattice<'a, V>, slices: &'a [Slice]) -> Self {
+        Cubes { lattice, slices, triangles: Triangles::new(lattice.is_mirrored()) }
+    }
+}
+
+impl<V: Volume> Extractor for Cubes<'_, V> {
+    type Scratch = Window;
+
+    fn scratch(&self) -> Window {
+        Window::new(self.lattice.size[0])
+    }
+
+    fn count(&self, _: &mut Window, z: usize) -> [u64; 2] {
+        let slice = &self.slices[z];
+        let corners: u64 = slice.masks().iter().map(|&mask| self.triangles.of(mask).len() as u64).sum();
+        [u64::from(slice.edges()), corners / 3]
+    }
+
+    #[inline(never)]
+    fn points(&self, _: &mut Window, z: usize, points: &mut Vec<DVec3>) {
+        edge_points(self.lattice, &self.slices[z], z, points);
+    }
+
+    #[inline(never)]
+    fn triangles(&self, window: &mut Window, z: usize, first: impl Fn(usize) -> u32, corners: &mut Vec<u32>) {
+        let slice = &self.slices[z];
+        // The last slice has no cells.
+        let Some(next) = self.slices.get(z + 1) else { return };
+        let (slices, firsts) = ([slice, next], [first(z), first(z + 1)]);
+        let mut masks = slice.masks().iter();
+        for y in 0..slice.rows() {
+            if y == 0 {
+                window.start(slices, firsts, y);
+            } else {
+                window.advance(slices, firsts, y);
+            }
+            for word in slice.row(y) {
+                let start = 64 * word.x as usize;
+                for (x, &mask) in Bits(word.mixed).zip(&mut masks) {
+                    let number = window.at(start + x as usize);
+                    corners.extend(self.triangles.of(mask).iter().map(|&edge| number(edge)));
+                }
+            }
+        }
+    }
+}
+
+/// Appends the points on the crossed edges of a slice, in order, in model units.
+#[inline]
+pub(super) fn edge_points<V: Volume>(lattice: &Lattice<V>, slice: &Slice, z: usize, points: &mut Vec<DVec3>) {
+    for y in 0..slice.rows() {
+        for word in slice.row(y) {
+            for axis in Axis::ALL {
+                for x in Bits(word.crossed[axis.index()]) {
+                    let at = [64 * word.x as usize + x as usize, y, z];
+                    let mut point = place(at);
+                    point[axis.index()] += lattice.crossing(at, axis);
+                    points.push(lattice.to_model(point));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Volumes to surfaces.
+//!
+//! Extraction has three parts that know little of each other. The **volume** knows the field and where the surface cuts an edge
+//! ([`volume`](crate::volume)). The **walker** knows in which order samples are looked at: it makes, slice by slice, words of 64 bits that
+//! say which edges are crossed and which cells are mixed. The **extractor** makes points and faces of these words, and asks the volume
+//! for places. So any extractor runs with any walker, over any volume.
+//!
+//! | part | done by |
+//! |---|---|
+//! | `sweep` | the walker: every sample once, as rows of bits, in slabs on all threads |
+//! | `slice` | its product: words of crossed edges and mixed cells, only where there is surface |
+//! | `lattice` | the volume with a border round it and a place in the model |
+//! | `run` | numbers points and faces slice by slice and passes them on in order |
+//! | `window` | the numbers of the points round a row of cells, kept in the first cache |
+//! | `cubes` | marching cubes |
+//!
+//! # What holds
+//!
+//! - Samples equal to the level are outside, and so are those that are not a number ([`Level`](crate::volume::Level)). Every point
+//!   keeps a thousandth of an edge from the samples. So there are no faces without area, and no two points at one place.
+//! - The surface is closed where it leaves the volume: half a step beyond the last samples, so that each sample is the middle of a box and
+//!   the volume as large as all boxes. On request ([`Border::Open`]) it ends at the last samples.
+//! - Memory is that of the signs of two slices for each thread, and a few bytes for each face while it is made.
+//! - The same volume gives the same bytes on any number of threads.
+
+mod cubes;
+mod lattice;
+mod run;
+mod slice;
+mod sweep;
+#[cfg(test)]
+mod tests;
+mod window;
+
+use crate::error::{Error, Result};
+use crate::mesh::{MeshSink, MeshSizes};
+use crate::progress::Progress;
+use crate::volume::{Level, Placement, Volume};
+use lattice::Lattice;
+
+/// How the surface is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Method {
+    /// Marching cubes: one point on each crossed edge, inside samples joined along edges only. Closed and manifold for all signs.
+    #[default]
+    MarchingCubes,
+}
+
+/// What happens where the surface leaves the volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Border {
+    /// It is closed half a step beyond the last samples: all beyond the volume counts as outside.
+    #[default]
+    Closed,
+    /// It ends at the last samples, with a rim.
+    Open,
+}
+
+/// What [`extract`] makes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExtractOptions {
+    /// Where the surface lies, and on which side the solid is.
+    pub level: Level,
+    /// How it is made.
+    pub method: Method,
+    /// What happens where it leaves the volume.
+    pub border: Border,
+    /// Where the lattice lies in the model. Faces are counter-clockwise seen from outside there, even if it is mirrored.
+    pub placement: Placement,
+}
+
+impl Default for ExtractOptions {
+    /// Marching cubes above 0, closed at the border, on the lattice's own coordinates.
+    fn default() -> Self {
+        ExtractOptions {
+            level: Level::above(0.0),
+            method: Method::default(),
+            border: Border::default(),
+            placement: Placement::default(),
+        }
+    }
+}
+
+/// Passes the surface of a volume to `sink` as triangles; returns its size. Without any sample inside, that is an empty mesh.
+///
+/// ```
+/// use zmend::Mesh;
+/// use zmend::contour::volume::{ExtractOptions, extract};
+/// use zmend::progress::Silent;
+/// use zmend::volume::{Level, Samples};
+///
+/// let ball = Samples::new([20; 3], |at| at.iter().map(|&c| (c as f64 - 9.5).powi(2)).sum::<f64>().sqrt());
+/// let mut mesh = Mesh::default();
+/// extract(&ball, &ExtractOptions { level: Level::below(8.0), ..ExtractOptions::default() }, &mut mesh, &Silent)?;
+/// let report = mesh.report();
+/// assert!(report.is_closed() && report.is_manifold());
+/// assert!((report.volume / (4.0 / 3.0 * std::f64::consts::PI * 512.0) - 1.0).abs() < 0.02);
+/// # Ok::<(), zmend::Error>(())
+/// ```
+///
+/// # Errors
+/// When the level is not a number or the placement is flat, when there would be 2^32 points or more, whatever `sink` returns,
+/// `Cancelled`, and `Memory` when `progress` says so.
+pub fn extract<V: Volume>(
+    volume: &V,
+    options: &ExtractOptions,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
+    if options.level.iso.is_nan() {
+        return Err(Error::setting("iso", "the level is not a number", "give a number between those of the volume"));
+    }
+    options.placement.check()?;
+    let lattice = Lattice::new(volume, options.level, options.placement, options.border == Border::Closed);
+    let slices = run::walk(&lattice, progress)?;
+    match options.method {
+        Method::MarchingCubes => run::pass_on(&cubes::Cubes::new(&lattice, &slices), &slices, sink, progress),
+    }
+}
