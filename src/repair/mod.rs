@@ -6,6 +6,7 @@ mod memory;
 mod options;
 mod refined;
 mod report;
+mod sampled;
 mod solid;
 mod trace;
 

@@ -24,6 +24,7 @@
 //!
 //! This module knows numbers and places only; surfaces are made by [`contour::volume`](crate::contour::volume).
 
+pub mod cubic;
 mod dense;
 mod field;
 pub mod image;

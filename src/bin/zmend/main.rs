@@ -4,6 +4,7 @@ mod args;
 mod bars;
 mod compare;
 mod digits;
+mod extract;
 mod goal;
 mod handles;
 mod info;
@@ -19,6 +20,7 @@ mod solid;
 mod summary;
 mod topology;
 mod units;
+mod volume;
 
 use args::{Args, Command};
 use std::process::ExitCode;
@@ -47,6 +49,7 @@ fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Repair(args) => repair::run(args),
         Command::Topology(args) => topology::run(args),
+        Command::Extract(args) => extract::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Sample(args) => sample::run(args),

@@ -4,7 +4,7 @@ use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
-use crate::solid::{self, Job};
+use crate::solid::{self, Job, Work};
 use crate::summary::Summary;
 use crate::{digits, goal, interrupt, memory};
 use glam::DVec3;
@@ -26,9 +26,10 @@ pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[input], args.write.force)?;
     let topology = args.handles.options();
+    crate::volume::refuse(input)?;
     let (None, GoalFormat::Mesh(format)) = (OctreeFormat::of_file(input)?, format) else {
-        let (surface, skeleton, patches) = (SurfaceArg::Mc, None, None);
-        let job = Job { input, goal, to: format, work: args, topology, surface, skeleton, patches };
+        let work = Work::new(args, SurfaceArg::Mc);
+        let job = Job { input, goal, to: format, work, topology, volume: None, skeleton: None, patches: None };
         return solid::run(&job).map(|()| ExitCode::SUCCESS);
     };
     let mut options = Options { topology, ..options(args, SurfaceArg::Mc) };
@@ -62,7 +63,7 @@ pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
     let peak_memory = memory::peak();
     bars.start("measure", 0);
     let before = before(&source.input, args.tell.report)?;
-    let after = after(report.sizes, report.volume, goal, bytes, args.tell.report)?;
+    let after = after(report.sizes, Some(report.volume), goal, bytes, args.tell.report)?;
     drop(bars);
     // The reading was done before the repair asked for it.
     let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read).map(|&(s, time)| (s.name(), time));
@@ -170,8 +171,8 @@ fn before(input: &Input, report: ReportArg) -> Result<Side> {
     Ok(Side::new(info, measured.then(|| Measured::input(input)).transpose()?))
 }
 
-/// What is known of the written surface, given its size and the volume that it encloses.
-pub(crate) fn after(sizes: MeshSizes, volume: f64, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
+/// What is known of the written surface, given its size and the volume that it encloses, if that is known.
+pub(crate) fn after(sizes: MeshSizes, volume: Option<f64>, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
     let MeshSizes { points, faces, corners } = sizes;
     let is_known = goal.is_file() && is_measured(faces, asked);
     Ok(Side {
@@ -180,7 +181,7 @@ pub(crate) fn after(sizes: MeshSizes, volume: f64, goal: &Path, bytes: u64, aske
         faces,
         // Closed and manifold by construction: every edge has two corners.
         euler: Some(points as i64 - (corners / 2) as i64 + faces as i64),
-        volume: Some(volume),
+        volume,
         measured: is_known.then(|| Measured::file(goal)).transpose()?,
     })
 }

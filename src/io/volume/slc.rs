@@ -118,7 +118,8 @@ pub(super) fn parse(name: &str, bytes: &[u8], progress: &dyn Progress) -> Result
         progress.advance(slice_len as u64);
     }
     let trailing = (bytes.len() - cursor.at) as u64;
-    let image = Image::new(size.map(|n| n as usize), Placement::with_spacing(DVec3::ZERO, spacing), Voxels::U8(samples));
+    let image =
+        Image::new(size.map(|n| n as usize), Placement::with_spacing(DVec3::ZERO, spacing), Voxels::U8(samples));
     Ok((image.map_err(|e| Error::format(name, Place::Whole, e.to_string(), ""))?, trailing))
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::progress::Silent;
-use crate::volume::{Placement, Voxels};
+use crate::volume::{Placement, Volume, Voxels};
 use glam::{DMat3, DVec3};
 
 /// 3 x 2 x 2 samples.

@@ -4,13 +4,13 @@ mod compare;
 mod repair;
 mod topology;
 mod values;
+mod volume;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
+pub(crate) use repair::{FacesArg, GridArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
-
-use repair::GridArgs;
+pub(crate) use volume::{ExtractArgs, VolumeArgs};
 
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, value_parser};
@@ -33,6 +33,7 @@ Examples:
   zmend info broken.ply                       what is wrong with it
   zmend repair broken.ply fixed.ply           repair it
   zmend topology fixed.ply clean.ply --cut 2  cut its thin handles
+  zmend extract scan.mhd scan.ply --iso 300   the surface of a volume
   zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
@@ -74,13 +75,14 @@ fn words() -> impl Iterator<Item = OsString> {
 pub(crate) enum Command {
     Repair(RepairArgs),
     Topology(TopologyArgs),
+    Extract(ExtractArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Sample(SampleArgs),
     Render(RenderArgs),
 }
 
-/// Tell what a mesh is, what is wrong with it, and what to do.
+/// Tell what a mesh is, what is wrong with it, and what to do; or what values a volume has.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -92,7 +94,7 @@ The triangles of STL files are taken as connected where their corners are identi
 Self-intersections are pairs of faces that meet anywhere but in common corners and edges: faces that pass through each \
 other, touch, or fold over each other. They are decided exactly, and counted up to a million.")]
 pub(crate) struct InfoArgs {
-    /// Meshes to look at, or octree files.
+    /// Meshes to look at, or octree files, or volumes.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Print one JSON object a file, each on its line.
