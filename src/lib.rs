@@ -112,7 +112,8 @@ pub use error::{Error, Place, Result};
 pub use glam;
 pub use mesh::{Mesh, Polygons};
 pub use repair::{
-    Faces, Inside, Keep, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into, solidify,
+    Faces, Inside, Keep, Offset, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into,
+    solidify,
 };
 
 /// The examples of the README are tests.

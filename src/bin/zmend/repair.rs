@@ -100,6 +100,7 @@ pub(crate) fn options(args: &WorkArgs, surface: SurfaceArg) -> Options {
         gap: args.inside.gap,
         thicken: args.inside.thicken,
         thicken_what: args.inside.thicken_what.into(),
+        offset: None,
         keep: args.inside.keep,
         drop_cavities: args.inside.drop_cavities,
         surface: args.surface.kind_or(surface).into(),
