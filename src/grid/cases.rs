@@ -82,8 +82,8 @@ fn derive(mask: Mask) -> Case {
     for s in 0..sheets.count {
         let of_sheet: Vec<&Vec<Edge>> = cycles.iter().filter(|c| sheet_of(c) == s).collect();
         match of_sheet[..] {
-            [cycle] => triangles.extend(best_disc(cycle)),
-            [a, b] => triangles.extend(best_tunnel(a, b)),
+            [cycle] => triangles.extend(best_disc(cycle).expect("checked for all 256 masks")),
+            [a, b] => triangles.extend(best_tunnel(a, b).expect("checked for all 256 masks")),
             _ => unreachable!("a component of inside corners has one or two cycles round it"),
         }
         let corners = Corner::ALL.into_iter().filter(|c| component[c.index()] == s);
@@ -169,7 +169,7 @@ fn cycles(mask: Mask) -> Vec<Vec<Edge>> {
 }
 
 /// Whether two edges lie on a common face of the cell.
-fn share_face(a: Edge, b: Edge) -> bool {
+pub(crate) fn share_face(a: Edge, b: Edge) -> bool {
     a.faces().iter().any(|face| b.faces().contains(face))
 }
 
@@ -186,7 +186,7 @@ fn passes_each_face_once(cycle: &[Edge]) -> bool {
 }
 
 /// The middle of an edge of the unit cell, doubled.
-fn middle(edge: Edge) -> [i32; 3] {
+pub(crate) fn middle(edge: Edge) -> [i32; 3] {
     let [a, b] = edge.corners();
     Axis::ALL.map(|axis| i32::from(a & axis) + i32::from(b & axis))
 }
@@ -231,13 +231,13 @@ fn best_triangulation(polygon: &[Edge], diagonal: &dyn Fn(Edge, Edge) -> bool) -
     best
 }
 
-fn best_disc(cycle: &[Edge]) -> Vec<[Edge; 3]> {
-    let (_, triangles) = best_triangulation(cycle, &|a, b| !share_face(a, b)).expect("checked for all 256 masks");
-    triangles
+/// The best triangulation of a disc bounded by a cycle, if there is one without other points.
+pub(crate) fn best_disc(cycle: &[Edge]) -> Option<Vec<[Edge; 3]>> {
+    best_triangulation(cycle, &|a, b| !share_face(a, b)).map(|(_, triangles)| triangles)
 }
 
-/// The band between two cycles: cut open along the best bridge, it is a polygon.
-fn best_tunnel(a: &[Edge], b: &[Edge]) -> Vec<[Edge; 3]> {
+/// The band between two cycles, if there is one without other points: cut open along the best bridge, it is a polygon.
+pub(crate) fn best_tunnel(a: &[Edge], b: &[Edge]) -> Option<Vec<[Edge; 3]>> {
     let rotated = |cycle: &[Edge], by: usize| {
         let mut ring = cycle.to_vec();
         ring.rotate_left(by);
@@ -245,7 +245,8 @@ fn best_tunnel(a: &[Edge], b: &[Edge]) -> Vec<[Edge; 3]> {
         ring
     };
     let mut best: Option<Weighed> = None;
-    for (i, j) in (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| (i, j))) {
+    let bridges = (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| (i, j)));
+    for (i, j) in bridges.filter(|&(i, j)| !share_face(a[i], b[j])) {
         let (ring_a, ring_b) = (rotated(a, i), rotated(b, j));
         let polygon = [ring_a, ring_b].concat();
         // Diagonals go across the band: inside one cycle they would leave it.
@@ -260,7 +261,7 @@ fn best_tunnel(a: &[Edge], b: &[Edge]) -> Vec<[Edge; 3]> {
             best = Some(found);
         }
     }
-    best.expect("checked for all 256 masks").1
+    best.map(|(_, triangles)| triangles)
 }
 
 #[cfg(test)]

@@ -62,6 +62,20 @@ impl Polygons {
         self.ends.push(u32::try_from(self.corners.len()).expect("fewer than 2^32 corners in a mesh"));
     }
 
+    /// Appends polygons that all have `arity` corners, one after another in `corners`.
+    ///
+    /// # Panics
+    /// When the number of corners is no multiple of `arity`, or all polygons together would have 2^32 corners or more.
+    pub fn push_all(&mut self, arity: usize, corners: &[u32]) {
+        assert!(corners.len().is_multiple_of(arity), "whole polygons");
+        let end = u32::try_from(self.corners.len() + corners.len()).expect("fewer than 2^32 corners in a mesh");
+        let start = self.corners.len() as u32;
+        self.corners.extend_from_slice(corners);
+        let polygons = corners.len() / arity;
+        self.ends.extend((1..=polygons as u32).map(|n| start + n * arity as u32));
+        debug_assert!(polygons == 0 || self.ends.last() == Some(&end), "the last polygon ends where the corners do");
+    }
+
     /// Number of polygons.
     pub fn len(&self) -> usize {
         self.ends.len()

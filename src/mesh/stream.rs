@@ -127,7 +127,7 @@ impl MeshSink for Mesh {
     }
 
     fn faces(&mut self, arity: usize, corners: &[u32]) -> Result<()> {
-        corners.chunks_exact(arity).for_each(|face| self.faces.push(face));
+        self.faces.push_all(arity, corners);
         Ok(())
     }
 }

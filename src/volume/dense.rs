@@ -2,6 +2,7 @@
 
 use super::{Level, Volume};
 use crate::error::{Error, Result};
+use crate::grid::Axis;
 
 /// A number type of which volumes are made: `u8`, `i8`, `u16`, `i16`, `u32`, `i32`, `f32`, `f64`. All are exact as `f64`.
 pub trait Sample: Copy + PartialOrd + Send + Sync + Into<f64> + 'static {
@@ -130,6 +131,13 @@ impl<T: Sample> Volume for Dense<'_, T> {
     fn value(&self, at: [usize; 3]) -> f64 {
         debug_assert!((0..3).all(|a| at[a] < self.size[a]), "lattice points are in the volume");
         self.values[self.index(at)].into()
+    }
+
+    #[inline]
+    fn crossing(&self, at: [usize; 3], axis: Axis, level: Level) -> f64 {
+        let from = self.index(at);
+        let to = (from as isize).wrapping_add(self.strides[axis.index()]) as usize;
+        level.between(self.values[from].into(), self.values[to].into())
     }
 
     fn signs(&self, [y, z]: [usize; 2], level: Level, words: &mut [u64]) {

@@ -78,13 +78,10 @@ impl<V: Volume> Extractor for Cubes<'_, V> {
         let Some(next) = self.slices.get(z + 1) else { return };
         let (slices, firsts) = ([slice, next], [first(z), first(z + 1)]);
         let mut masks = slice.masks().iter();
+        let mut row = None;
         for y in 0..slice.rows() {
-            if y == 0 {
-                window.start(slices, firsts, y);
-            } else {
-                window.advance(slices, firsts, y);
-            }
-            for word in slice.row(y) {
+            for word in slice.row(y).iter().filter(|word| word.mixed != 0) {
+                window.go_to(&mut row, slices, firsts, y);
                 let start = 64 * word.x as usize;
                 for (x, &mask) in Bits(word.mixed).zip(&mut masks) {
                     let number = window.at(start + x as usize);
@@ -100,12 +97,12 @@ impl<V: Volume> Extractor for Cubes<'_, V> {
 pub(super) fn edge_points<V: Volume>(lattice: &Lattice<V>, slice: &Slice, z: usize, points: &mut Vec<DVec3>) {
     for y in 0..slice.rows() {
         for word in slice.row(y) {
-            for axis in Axis::ALL {
+            let first = [64 * word.x as usize, y, z];
+            let start = lattice.to_model(place(first));
+            for (axis, along) in Axis::ALL.into_iter().zip(lattice.steps()) {
                 for x in Bits(word.crossed[axis.index()]) {
-                    let at = [64 * word.x as usize + x as usize, y, z];
-                    let mut point = place(at);
-                    point[axis.index()] += lattice.crossing(at, axis);
-                    points.push(lattice.to_model(point));
+                    let t = lattice.crossing([first[0] + x as usize, y, z], axis);
+                    points.push(start + lattice.steps()[0] * f64::from(x) + along * t);
                 }
             }
         }

@@ -37,7 +37,7 @@ impl<'a, V: Volume> Lattice<'a, V> {
 
     /// The lattice point of the volume, if it is no virtual one.
     #[inline]
-    fn sample(&self, at: [usize; 3]) -> Option<[usize; 3]> {
+    pub(crate) fn sample(&self, at: [usize; 3]) -> Option<[usize; 3]> {
         let at = at.map(|c| c.wrapping_sub(self.border));
         let size = self.volume.size();
         (at[0] < size[0] && at[1] < size[1] && at[2] < size[2]).then_some(at)
@@ -57,6 +57,11 @@ impl<'a, V: Volume> Lattice<'a, V> {
             }
             _ => 0.5,
         }
+    }
+
+    /// How far a lattice point is inside; in the border, one unit outside.
+    pub(crate) fn depth(&self, at: [usize; 3]) -> f64 {
+        self.sample(at).map_or(-1.0, |at| self.level.depth(self.volume.value(at)))
     }
 
     /// The cells of a row that may hold surface, among them those of the border; none where there is no row.
@@ -84,6 +89,13 @@ impl<'a, V: Volume> Lattice<'a, V> {
     #[inline]
     pub(crate) fn to_model(&self, place: DVec3) -> DVec3 {
         self.placement.to_model(place)
+    }
+
+    /// The steps from a lattice point to the next one along x, y and z, in model units.
+    #[inline]
+    pub(crate) fn steps(&self) -> [DVec3; 3] {
+        let axes = &self.placement.axes;
+        [axes.x_axis, axes.y_axis, axes.z_axis]
     }
 
     /// Whether faces made on the lattice have to be turned over in the model.

@@ -13,6 +13,10 @@
 //! | `run` | numbers points and faces slice by slice and passes them on in order |
 //! | `window` | the numbers of the points round a row of cells, kept in the first cache |
 //! | `cubes` | marching cubes |
+//! | `trilinear` | marching cubes with the topology of the trilinear interpolant |
+//! | `polygons` | the cases as polygons, of which dual surfaces have vertices |
+//! | `tangents`, `cell_points` | tangent planes, and where vertices in cells go |
+//! | `rows`, `dual` | dual contouring and surface nets |
 //!
 //! # What holds
 //!
@@ -23,13 +27,19 @@
 //! - Memory is that of the signs of two slices for each thread, and a few bytes for each face while it is made.
 //! - The same volume gives the same bytes on any number of threads.
 
+mod cell_points;
 mod cubes;
+mod dual;
 mod lattice;
+mod polygons;
+mod rows;
 mod run;
 mod slice;
 mod sweep;
+mod tangents;
 #[cfg(test)]
 mod tests;
+mod trilinear;
 mod window;
 
 use crate::error::{Error, Result};
@@ -45,6 +55,14 @@ pub enum Method {
     /// Marching cubes: one point on each crossed edge, inside samples joined along edges only. Closed and manifold for all signs.
     #[default]
     MarchingCubes,
+    /// Marching cubes with the topology of the trilinear interpolant of the samples ("Marching cubes 33"): where signs alone leave open what
+    /// is joined, their values decide. Closed and manifold for all values.
+    Trilinear,
+    /// Dual contouring: one point for each sheet of the surface in a cell, where its tangent planes meet, so that sharp edges and corners are
+    /// kept. Closed and manifold for all signs.
+    DualContouring,
+    /// Surface nets: as dual contouring, with points in the middle of the crossings.
+    SurfaceNets,
 }
 
 /// What happens where the surface leaves the volume.
@@ -116,5 +134,10 @@ pub fn extract<V: Volume>(
     let slices = run::walk(&lattice, progress)?;
     match options.method {
         Method::MarchingCubes => run::pass_on(&cubes::Cubes::new(&lattice, &slices), &slices, sink, progress),
+        Method::Trilinear => run::pass_on(&trilinear::Trilinear::new(&lattice, &slices), &slices, sink, progress),
+        Method::DualContouring | Method::SurfaceNets => {
+            let dual = dual::Dual::new(&lattice, &slices, options.method == Method::DualContouring, progress)?;
+            run::pass_on(&dual, &slices, sink, progress)
+        }
     }
 }

@@ -51,6 +51,17 @@ pub(super) fn walk<W: Walker>(walker: &W, progress: &dyn Progress) -> Result<Vec
     Ok(slabs.into_iter().flatten().collect())
 }
 
+/// Something made of each slice, on all threads.
+pub(super) fn in_parallel<S, T: Send>(
+    slices: usize,
+    progress: &dyn Progress,
+    init: impl Fn() -> S + Sync + Send,
+    make: impl Fn(&mut S, usize) -> T + Sync,
+) -> Result<Vec<T>> {
+    let checked = |state: &mut S, z| check(progress).map(|()| make(state, z));
+    (0..slices).into_par_iter().map_init(init, checked).collect()
+}
+
 /// Passes on the points and triangles of all slices.
 pub(super) fn pass_on<E: Extractor>(
     extractor: &E,
@@ -58,11 +69,7 @@ pub(super) fn pass_on<E: Extractor>(
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
-    let counts: Vec<[u64; 2]> = (0..slices.len())
-        .into_par_iter()
-        .map_init(|| extractor.scratch(), |scratch, z| extractor.count(scratch, z))
-        .collect();
-    check(progress)?;
+    let counts = in_parallel(slices.len(), progress, || extractor.scratch(), |scratch, z| extractor.count(scratch, z))?;
     let mut points = 0;
     let mut firsts = Vec::with_capacity(counts.len());
     for [n, _] in &counts {

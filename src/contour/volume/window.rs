@@ -28,7 +28,7 @@ impl Window {
     }
 
     /// Fills in all rows round the cells at `y` between two slices, of which the first points have these numbers.
-    pub(super) fn start(&mut self, slices: [&Slice; 2], firsts: [u32; 2], y: usize) {
+    fn start(&mut self, slices: [&Slice; 2], firsts: [u32; 2], y: usize) {
         for side in 0..2 {
             self.fill(side, slices[side], firsts[side], y);
             self.fill(2 + side, slices[side], firsts[side], y + 1);
@@ -36,13 +36,23 @@ impl Window {
     }
 
     /// Goes on from the cells of the row before to those at `y`.
-    pub(super) fn advance(&mut self, slices: [&Slice; 2], firsts: [u32; 2], y: usize) {
+    fn advance(&mut self, slices: [&Slice; 2], firsts: [u32; 2], y: usize) {
         let [a, b, c, d] = self.starts;
         self.starts = [c, d, a, b];
         self.set_edges();
         for side in 0..2 {
             self.fill(2 + side, slices[side], firsts[side], y + 1);
         }
+    }
+
+    /// Goes on to the cells at `y`, from those at `row`, if it has been at any.
+    pub(super) fn go_to(&mut self, row: &mut Option<usize>, slices: [&Slice; 2], firsts: [u32; 2], y: usize) {
+        match *row {
+            Some(row) if row == y => return,
+            Some(row) if row + 1 == y => self.advance(slices, firsts, y),
+            _ => self.start(slices, firsts, y),
+        }
+        *row = Some(y);
     }
 
     /// The numbers of the points on the edges of a cell, given its lattice point with the least x. Only those on crossed edges mean anything.
