@@ -50,6 +50,7 @@ fn run(args: &Args) -> Result<ExitCode> {
         Command::Repair(args) => repair::run(args),
         Command::Topology(args) => topology::run(args),
         Command::Extract(args) => extract::run(args),
+        Command::Remesh(args) => repair::remesh(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Sample(args) => sample::run(args),

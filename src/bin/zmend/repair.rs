@@ -1,6 +1,6 @@
-//! `zmend repair`: the main job.
+//! `zmend repair`, the main job, and `zmend remesh`, which is one with another surface.
 
-use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
+use crate::args::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
@@ -15,24 +15,36 @@ use std::time::Instant;
 use zmend::io::{self, Format, Input, OctreeFormat, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
-use zmend::{Faces, Options, Result, repair_into, topology};
+use zmend::{Error, Faces, Offset, Options, Result, repair_into, topology};
 
 /// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
 const SMALL: u64 = 1_000_000;
 
 pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
-    let RepairArgs { input, work: args, .. } = repair;
-    let goal = repair.goal();
+    make(&repair.input, repair.goal(), &repair.work, None)
+}
+
+/// `zmend remesh`: a repair whose surface lies elsewhere.
+pub(crate) fn remesh(args: &RemeshArgs) -> Result<ExitCode> {
+    if let (Some(format), Some(_)) = (OctreeFormat::of_file(&args.input)?, args.offset()) {
+        let problem = format!("{} is an octree ({format}): distances are those to faces", args.input.display());
+        return Err(Error::setting("offset", problem, "make a mesh of it with `zmend repair` first"));
+    }
+    make(&args.input, &args.out, &args.work, args.offset())
+}
+
+fn make(input: &Path, goal: &Path, args: &WorkArgs, offset: Option<Offset>) -> Result<ExitCode> {
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[input], args.write.force)?;
     let topology = args.handles.options();
     crate::volume::refuse(input)?;
     let (None, GoalFormat::Mesh(format)) = (OctreeFormat::of_file(input)?, format) else {
-        let work = Work::new(args, SurfaceArg::Mc);
+        let mut work = Work::new(args, SurfaceArg::Mc);
+        work.options.offset = offset;
         let job = Job { input, goal, to: format, work, topology, volume: None, skeleton: None, patches: None };
         return solid::run(&job).map(|()| ExitCode::SUCCESS);
     };
-    let mut options = Options { topology, ..options(args, SurfaceArg::Mc) };
+    let mut options = Options { topology, offset, ..options(args, SurfaceArg::Mc) };
     if format.has_only_triangles() {
         // The surface knows better than the writer which diagonals to take.
         options.faces = Faces::Triangles;

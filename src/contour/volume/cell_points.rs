@@ -91,11 +91,8 @@ pub(super) fn place_all<V: Volume>(
     solve: impl Fn(&Planes, bool) -> CellPoint + Sync,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<CellPoint>>> {
-    let scratch = || Scratch {
-        window: Window::new(lattice.size[0]),
-        tangents: Tangents::default(),
-        planes: Planes::default(),
-    };
+    let scratch =
+        || Scratch { window: Window::new(lattice.size[0]), tangents: Tangents::default(), planes: Planes::default() };
     let to_unit = lattice.unit_normals();
     let place = |Scratch { window, tangents, planes }: &mut Scratch, z: usize| {
         let slice = &slices[z];

@@ -147,7 +147,8 @@ impl<'a, V: Volume> Dual<'a, V> {
                     let edges = word.crossed[axis.index()] & rows.complete(axis, word.x as usize);
                     for x in Bits(edges) {
                         let x = 64 * word.x as usize + x as usize;
-                        let mut cells = CELLS[axis.index()].map(|(back, row, edge)| (back, rows.at(row, x - back[0]), edge));
+                        let mut cells =
+                            CELLS[axis.index()].map(|(back, row, edge)| (back, rows.at(row, x - back[0]), edge));
                         // The first cell is the edge's own: its least corner is where the edge starts.
                         if cells[0].1.mask & 1 == 0 {
                             cells.swap(1, 3);
@@ -166,7 +167,8 @@ impl<'a, V: Volume> Dual<'a, V> {
 
     /// Number of corners of the face of an edge.
     fn corners(&self, cells: &[([usize; 3], Seen, Edge); 4]) -> usize {
-        let around = |&(_, seen, edge): &(_, Seen, Edge)| self.polygons[usize::from(seen.mask)].around[edge.index()].len();
+        let around =
+            |&(_, seen, edge): &(_, Seen, Edge)| self.polygons[usize::from(seen.mask)].around[edge.index()].len();
         cells.iter().map(around).sum()
     }
 }

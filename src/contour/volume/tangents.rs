@@ -53,7 +53,13 @@ impl Tangents {
     }
 }
 
-fn tangents_of<V: Volume>(lattice: &Lattice<V>, slice: &Slice, z: usize, with_normals: bool, tangents: &mut Vec<Tangent>) {
+fn tangents_of<V: Volume>(
+    lattice: &Lattice<V>,
+    slice: &Slice,
+    z: usize,
+    with_normals: bool,
+    tangents: &mut Vec<Tangent>,
+) {
     for y in 0..slice.rows() {
         for word in slice.row(y) {
             for axis in Axis::ALL {
@@ -83,7 +89,8 @@ impl<V: Volume> Lattice<'_, V> {
             _ if self.level.below => -along,
             _ => along,
         };
-        let gradient = if gradient.is_finite() && gradient != DVec3::ZERO { gradient } else { self.difference(at, to) * along };
+        let gradient =
+            if gradient.is_finite() && gradient != DVec3::ZERO { gradient } else { self.difference(at, to) * along };
         // Scaled first: squares of tiny numbers vanish.
         let outward = gradient / if self.level.below { 1.0 } else { -1.0 } / gradient.abs().max_element();
         let length = (self.covector * outward).length();

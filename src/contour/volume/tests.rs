@@ -1,6 +1,6 @@
 use super::*;
-use crate::mesh::{Mesh, TriangleTree};
 use crate::mesh::chance::Chance;
+use crate::mesh::{Mesh, TriangleTree};
 use crate::progress::Silent;
 use crate::volume::{Dense, LevelSet};
 use glam::{DMat3, DQuat, DVec3};
@@ -46,7 +46,11 @@ fn random_volumes_have_closed_surfaces() {
             let mesh = surface(&values, size, &ExtractOptions { method, ..ExtractOptions::default() });
             assert_eq!(mesh.validate(), Ok(()), "{method:?}, kind {kind}, seed {seed}");
             let report = mesh.report();
-            assert_eq!((report.zero_area_faces, report.isolated_points), (0, 0), "{method:?}, kind {kind}, seed {seed}");
+            assert_eq!(
+                (report.zero_area_faces, report.isolated_points),
+                (0, 0),
+                "{method:?}, kind {kind}, seed {seed}"
+            );
             assert!(mesh.outward() && report.faces > 100);
         }
     }

@@ -7,10 +7,12 @@ mod values;
 mod volume;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use repair::{FacesArg, GridArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
+pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
 pub(crate) use volume::{ExtractArgs, VolumeArgs};
+
+use repair::GridArgs;
 
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, value_parser};
@@ -54,6 +56,7 @@ pub(crate) fn parse() -> Args {
     let work = match &mut args.command {
         Command::Repair(args) => Some(&mut args.work),
         Command::Topology(args) => Some(&mut args.work),
+        Command::Remesh(args) => Some(&mut args.work),
         _ => None,
     };
     if let (Some(work), Some((_, matches))) = (work, matches.subcommand()) {
@@ -76,6 +79,7 @@ pub(crate) enum Command {
     Repair(RepairArgs),
     Topology(TopologyArgs),
     Extract(ExtractArgs),
+    Remesh(RemeshArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Sample(SampleArgs),

@@ -98,16 +98,14 @@ impl VolumeArgs {
 /// How a surface is made of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum MethodArg {
-    /// Marching cubes: triangles.
+    /// Marching cubes: triangles; samples are joined along edges only.
     Mc,
-}
-
-impl From<MethodArg> for Method {
-    fn from(arg: MethodArg) -> Self {
-        match arg {
-            MethodArg::Mc => Method::MarchingCubes,
-        }
-    }
+    /// Marching cubes with the topology of the trilinear interpolant: where signs leave open what is joined, values decide.
+    Mc33,
+    /// Dual contouring: keeps sharp edges and corners.
+    Dc,
+    /// Surface nets: smooth quadrilaterals.
+    Nets,
 }
 
 impl MethodArg {
@@ -115,6 +113,18 @@ impl MethodArg {
     pub(crate) fn name(self) -> &'static str {
         match self {
             MethodArg::Mc => "mc",
+            MethodArg::Mc33 => "mc33",
+            MethodArg::Dc => "dc",
+            MethodArg::Nets => "nets",
+        }
+    }
+
+    /// How the surface is made of the volume itself, if it is not made of an octree.
+    pub(crate) fn direct(self) -> Option<Method> {
+        match self {
+            MethodArg::Mc => Some(Method::MarchingCubes),
+            MethodArg::Mc33 => Some(Method::Trilinear),
+            MethodArg::Dc | MethodArg::Nets => None,
         }
     }
 
@@ -122,6 +132,9 @@ impl MethodArg {
     pub(crate) fn surface(self) -> Option<Surface> {
         match self {
             MethodArg::Mc => Some(Surface::MarchingCubes),
+            MethodArg::Mc33 => None,
+            MethodArg::Dc => Some(Surface::DualContouring),
+            MethodArg::Nets => Some(Surface::Quads),
         }
     }
 }

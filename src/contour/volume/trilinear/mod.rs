@@ -45,7 +45,8 @@ impl<'a, V: Volume> Trilinear<'a, V> {
 
     fn choose(&self, at: [usize; 3], variants: &'static Variants) -> &'static Patch {
         let values = Corner::ALL.map(|corner| self.lattice.depth(corner_of(at, corner)));
-        let choice = variants.faces.iter().rev().fold(0, |bits, &face| bits << 1 | usize::from(is_joined(&values, face)));
+        let choice =
+            variants.faces.iter().rev().fold(0, |bits, &face| bits << 1 | usize::from(is_joined(&values, face)));
         let variant = &variants.by_choice[choice];
         if variant.tunnels.is_empty() {
             return &variant.discs;

@@ -85,7 +85,11 @@ fn topology_is_that_of_a_refined_grid() {
             };
             // Each disc cuts the cell in two; a tunnel joins two of the parts.
             let parts = [count(true), count(false)];
-            assert_eq!(parts[0] + parts[1] + usize::from(meeting > 0), variant.cycles.len() + 1, "mask {mask} {values:?}");
+            assert_eq!(
+                parts[0] + parts[1] + usize::from(meeting > 0),
+                variant.cycles.len() + 1,
+                "mask {mask} {values:?}"
+            );
             tunnels += meeting;
             if round < 6 {
                 // Necks thinner than the step of a grid are not seen by it.

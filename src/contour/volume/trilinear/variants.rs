@@ -254,7 +254,6 @@ mod tests {
             }
         }
         assert_eq!((variants, tunnels), (656, 424));
-
     }
 
     /// Chernyaev's case 13: all faces are open, and each of the 64 choices has a surface.
