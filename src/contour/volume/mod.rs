@@ -17,6 +17,7 @@
 //! | `polygons` | the cases as polygons, of which dual surfaces have vertices |
 //! | `tangents`, `cell_points` | tangent planes, and where vertices in cells go |
 //! | `rows`, `dual` | dual contouring and surface nets |
+//! | `feature`, `extended` | extended marching cubes |
 //!
 //! # What holds
 //!
@@ -30,6 +31,8 @@
 mod cell_points;
 mod cubes;
 mod dual;
+mod extended;
+mod feature;
 mod lattice;
 mod polygons;
 mod rows;
@@ -42,7 +45,7 @@ mod tests;
 mod trilinear;
 mod window;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Short};
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::progress::Progress;
 use crate::volume::{Level, Placement, Volume};
@@ -63,6 +66,9 @@ pub enum Method {
     DualContouring,
     /// Surface nets: as dual contouring, with points in the middle of the crossings.
     SurfaceNets,
+    /// Extended marching cubes: marching cubes, with a point more where there is a sharp edge or corner
+    /// ([`feature_angle`](ExtractOptions::feature_angle)). Without such, it is marching cubes. Closed and manifold for all signs.
+    ExtendedMarchingCubes,
 }
 
 /// What happens where the surface leaves the volume.
@@ -84,17 +90,20 @@ pub struct ExtractOptions {
     pub method: Method,
     /// What happens where it leaves the volume.
     pub border: Border,
+    /// Extended marching cubes: normals in a cell that differ by more than this angle, in degrees, are those of a feature. Above 0, below 90.
+    pub feature_angle: f64,
     /// Where the lattice lies in the model. Faces are counter-clockwise seen from outside there, even if it is mirrored.
     pub placement: Placement,
 }
 
 impl Default for ExtractOptions {
-    /// Marching cubes above 0, closed at the border, on the lattice's own coordinates.
+    /// Marching cubes above 0, closed at the border, on the lattice's own coordinates; features from 30 degrees on.
     fn default() -> Self {
         ExtractOptions {
             level: Level::above(0.0),
             method: Method::default(),
             border: Border::default(),
+            feature_angle: 30.0,
             placement: Placement::default(),
         }
     }
@@ -118,7 +127,7 @@ impl Default for ExtractOptions {
 /// ```
 ///
 /// # Errors
-/// When the level is not a number or the placement is flat, when there would be 2^32 points or more, whatever `sink` returns,
+/// When the level is not a number, the feature angle out of range or the placement flat, when there would be 2^32 points or more, whatever `sink` returns,
 /// `Cancelled`, and `Memory` when `progress` says so.
 pub fn extract<V: Volume>(
     volume: &V,
@@ -129,6 +138,10 @@ pub fn extract<V: Volume>(
     if options.level.iso.is_nan() {
         return Err(Error::setting("iso", "the level is not a number", "give a number between those of the volume"));
     }
+    if !(options.feature_angle > 0.0 && options.feature_angle < 90.0) {
+        let problem = format!("{} is not above 0 and below 90", Short(options.feature_angle));
+        return Err(Error::setting("feature-angle", problem, "30 is the default"));
+    }
     options.placement.check()?;
     let lattice = Lattice::new(volume, options.level, options.placement, options.border == Border::Closed);
     let slices = run::walk(&lattice, progress)?;
@@ -138,6 +151,10 @@ pub fn extract<V: Volume>(
         Method::DualContouring | Method::SurfaceNets => {
             let dual = dual::Dual::new(&lattice, &slices, options.method == Method::DualContouring, progress)?;
             run::pass_on(&dual, &slices, sink, progress)
+        }
+        Method::ExtendedMarchingCubes => {
+            let extended = extended::Extended::new(&lattice, &slices, options.feature_angle, progress)?;
+            run::pass_on(&extended, &slices, sink, progress)
         }
     }
 }

@@ -24,7 +24,7 @@ pub(super) trait Extractor: Sync {
     /// Makes that.
     fn scratch(&self) -> Self::Scratch;
 
-    /// Number of points and triangles of slice `z`.
+    /// Number of points of slice `z`, and of triangles: its own, or others', but as many in all as there are.
     fn count(&self, scratch: &mut Self::Scratch, z: usize) -> [u64; 2];
 
     /// Appends the points of slice `z`, in model units.
@@ -98,13 +98,15 @@ pub(super) fn pass_on<E: Extractor>(
     let make_triangles = |scratch: &mut E::Scratch, z: usize| {
         let mut corners = Vec::with_capacity(3 * counts[z][1] as usize);
         extractor.triangles(scratch, z, |z| firsts.get(z).map_or(0, |&n| n as u32), &mut corners);
-        debug_assert_eq!(corners.len() as u64, 3 * counts[z][1], "triangles of slice {z} are as many as were counted");
         corners
     };
+    let mut made = 0;
     let take_triangles = |corners: Vec<u32>| {
         progress.advance(1);
+        made += corners.len() as u64;
         sink.faces(3, &corners)
     };
     in_order(slices.len(), progress, || extractor.scratch(), make_triangles, take_triangles)?;
+    debug_assert_eq!(made, 3 * faces, "triangles are as many as were counted");
     Ok(sizes)
 }

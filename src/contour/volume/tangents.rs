@@ -154,7 +154,12 @@ impl Planes {
     /// their cell may look for the same place: each stays a little apart.
     pub(super) fn solve(&self, is_alone: bool) -> (Vec3A, bool) {
         let (place, is_creased) = self.solve_alone();
-        if is_alone { (place, is_creased) } else { (place.lerp(self.middle(), APART), is_creased) }
+        (if is_alone { place } else { self.apart(place) }, is_creased)
+    }
+
+    /// The place drawn to the polygon a little.
+    pub(super) fn apart(&self, place: Vec3A) -> Vec3A {
+        place.lerp(self.middle(), APART)
     }
 
     fn solve_alone(&self) -> (Vec3A, bool) {

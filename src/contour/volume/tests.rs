@@ -35,7 +35,13 @@ fn cells(size: usize, field: impl Fn(DVec3) -> f64 + Sync, method: Method) -> Me
     mesh
 }
 
-const METHODS: [Method; 4] = [Method::MarchingCubes, Method::Trilinear, Method::DualContouring, Method::SurfaceNets];
+const METHODS: [Method; 5] = [
+    Method::MarchingCubes,
+    Method::Trilinear,
+    Method::DualContouring,
+    Method::SurfaceNets,
+    Method::ExtendedMarchingCubes,
+];
 
 #[test]
 fn random_volumes_have_closed_surfaces() {
@@ -57,8 +63,8 @@ fn random_volumes_have_closed_surfaces() {
 }
 
 /// A cube turned askew: its edges and corners.
-fn turned_cube(half: f64, middle: f64) -> (impl Fn(DVec3) -> f64 + Sync, Vec<DVec3>) {
-    let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7));
+fn turned_cube(half: f64, middle: f64, angle: f64) -> (impl Fn(DVec3) -> f64 + Sync, Vec<DVec3>) {
+    let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), angle));
     let field = move |p: DVec3| half - (turn * (p - middle)).abs().max_element();
     let mut features = Vec::new();
     for axis in 0..3 {
@@ -84,9 +90,13 @@ fn farthest(mesh: &Mesh, points: &[DVec3]) -> (f64, f64) {
 
 #[test]
 fn sharp_edges_and_corners_are_kept() {
-    for method in [Method::DualContouring] {
-        let (field, features) = turned_cube(9.3, 15.6);
-        let (mean, worst) = farthest(&cells(32, field, method), &features);
-        assert!(worst < 0.1 && mean < 0.01, "{method:?}: {mean} {worst}");
+    for method in [Method::DualContouring, Method::ExtendedMarchingCubes] {
+        for turn in 0..6 {
+            let (field, features) = turned_cube(9.3, 15.6, 0.2 + 0.37 * f64::from(turn));
+            let mesh = cells(32, field, method);
+            let (mean, worst) = farthest(&mesh, &features);
+            assert!(worst < 0.1 && mean < 0.01, "{method:?}: {mean} {worst}");
+            assert_eq!((mesh.validate(), mesh.report().zero_area_faces), (Ok(()), 0));
+        }
     }
 }
