@@ -12,7 +12,7 @@ use crate::{digits, interrupt, json, memory, units};
 use serde_json::json;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-use zmend::contour::volume::{Border, ExtractOptions, Method, extract};
+use zmend::contour::volume::{Border, ExtractOptions, extract};
 use zmend::io::{self, Format, WriteOptions};
 use zmend::mesh::Bounds;
 use zmend::progress::{Progress, Stage};
@@ -23,8 +23,8 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
     let to = goal::format(out, write.format.map(Into::into))?;
     goal::check(out, &[input], write.force)?;
     let topology = args.handles.options();
-    match (to, args.method.direct()) {
-        (GoalFormat::Mesh(format), Some(method)) if topology.is_nothing() => direct(args, format, method)?,
+    match to {
+        GoalFormat::Mesh(format) if topology.is_nothing() => direct(args, format)?,
         _ => {
             let of_octree = |problem: &str, remedy: &str| Err(Error::setting("method", problem, remedy));
             let Some(surface) = args.method.surface() else {
@@ -34,10 +34,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
                 );
             };
             if args.open {
-                return of_octree(
-                    "only surfaces made of the volume itself can be open",
-                    "leave --open away, or take mc or mc33",
-                );
+                return of_octree("only surfaces made of the volume itself can be open", "leave --open away");
             }
             let options = Options { surface, ..Options::default() };
             let given = args.cell.map(|_| "cell");
@@ -50,7 +47,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
 }
 
 /// Extracts the surface from the volume itself.
-fn direct(args: &ExtractArgs, format: Format, method: Method) -> Result<()> {
+fn direct(args: &ExtractArgs, format: Format) -> Result<()> {
     let ExtractArgs { input, out, write, tell, .. } = args;
     let bars = Bars::new(!tell.quiet && !tell.json).within(memory::limit(args.max_memory)?);
     let start = Instant::now();
@@ -65,7 +62,7 @@ fn direct(args: &ExtractArgs, format: Format, method: Method) -> Result<()> {
     image.corners().into_iter().for_each(|corner| bounds.add(corner));
     let (precision, _) = digits::of_box(&bounds, placement.spacing().min_element(), format, write.ascii)?;
     let border = if args.open { Border::Open } else { Border::Closed };
-    let options = ExtractOptions { level, method, border, placement };
+    let options = ExtractOptions { level, method: args.method.into(), border, placement, ..ExtractOptions::default() };
     let write_options = WriteOptions { precision, is_text: write.ascii, ..WriteOptions::default() };
     let (sizes, extracted, bytes) = interrupt::noted(|| {
         let mut writer = io::create(out, format, write_options)?;

@@ -88,7 +88,7 @@ mod tests {
             let corners: usize = polygons.list.iter().map(Vec::len).sum();
             let cycles: usize = case.cycles.iter().map(Vec::len).sum();
             assert_eq!(corners, cycles + 2 * (polygons.list.len() - case.cycles.len()));
-            assert_eq!(corners, polygons.around.iter().map(Vec::len).sum());
+            assert_eq!(corners, polygons.around.iter().map(Vec::len).sum::<usize>());
         }
         // Few masks need it.
         assert_eq!(all.iter().zip(&*CASES).filter(|(p, c)| p.list.len() > c.cycles.len()).count(), 36);

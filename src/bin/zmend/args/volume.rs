@@ -104,8 +104,22 @@ pub(crate) enum MethodArg {
     Mc33,
     /// Dual contouring: keeps sharp edges and corners.
     Dc,
-    /// Surface nets: smooth quadrilaterals.
+    /// Surface nets: smooth, one point a cell.
     Nets,
+    /// Extended marching cubes: marching cubes with points more at sharp edges and corners.
+    Emc,
+}
+
+impl From<MethodArg> for Method {
+    fn from(arg: MethodArg) -> Self {
+        match arg {
+            MethodArg::Mc => Method::MarchingCubes,
+            MethodArg::Mc33 => Method::Trilinear,
+            MethodArg::Dc => Method::DualContouring,
+            MethodArg::Nets => Method::SurfaceNets,
+            MethodArg::Emc => Method::ExtendedMarchingCubes,
+        }
+    }
 }
 
 impl MethodArg {
@@ -116,15 +130,7 @@ impl MethodArg {
             MethodArg::Mc33 => "mc33",
             MethodArg::Dc => "dc",
             MethodArg::Nets => "nets",
-        }
-    }
-
-    /// How the surface is made of the volume itself, if it is not made of an octree.
-    pub(crate) fn direct(self) -> Option<Method> {
-        match self {
-            MethodArg::Mc => Some(Method::MarchingCubes),
-            MethodArg::Mc33 => Some(Method::Trilinear),
-            MethodArg::Dc | MethodArg::Nets => None,
+            MethodArg::Emc => "emc",
         }
     }
 
@@ -132,7 +138,7 @@ impl MethodArg {
     pub(crate) fn surface(self) -> Option<Surface> {
         match self {
             MethodArg::Mc => Some(Surface::MarchingCubes),
-            MethodArg::Mc33 => None,
+            MethodArg::Mc33 | MethodArg::Emc => None,
             MethodArg::Dc => Some(Surface::DualContouring),
             MethodArg::Nets => Some(Surface::Quads),
         }
