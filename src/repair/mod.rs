@@ -135,15 +135,11 @@ fn mend(
     if let Some(width) = options.thicken {
         octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
     }
-<<<<<<< HEAD
     if let Some(by) = options.offset {
         let with_normals = options.surface.needs_normals();
         octree = clock.time(Stage::Sign, || offset(&octree, source, &frame, by, with_normals, progress))?;
     }
-    let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
-=======
     let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities, progress))?;
->>>>>>> main
     let mut solid = Solid::new(octree, frame);
     let mut topology = None;
     if !options.topology.is_nothing() {

@@ -16,6 +16,7 @@ use crate::grid::brick::Plane;
 use crate::grid::{Axis, Key};
 use crate::octree::SignedOctree;
 use crate::octree::crossings::{Sample, lattice_point};
+use crate::octree::signed::GIVEN_BYTES;
 use crate::progress::{Progress, Stage, check};
 use crate::volume::{Level, Volume};
 use glam::DVec3;
@@ -62,6 +63,7 @@ impl Solid {
         let bricks = Bricks::of(volume, level, depth, progress)?;
         let signs = bricks.listed();
         check(progress)?;
+        progress.hold((bricks.classes.len() + signs.len() * GIVEN_BYTES) as u64)?;
         let field = Field { volume, level, size };
         let samples = |place: usize, crossed: &[Plane; 3], out: &mut Vec<Sample>| {
             let start = lattice_point(depth, signs[place].0).map(|c| i64::from(c) - MARGIN as i64);

@@ -11,7 +11,7 @@
 //!
 //! Cost: a [`Band`] of the distance; some 200 ns a crossed edge.
 
-use super::band::{Band, MOST_CELLS, between};
+use super::band::{Band, MOST_CELLS, between, seed_bytes};
 use super::thicken::{clipped, for_crossed, sample};
 use crate::error::{Error, Result, Short};
 use crate::geom::Frame;
@@ -19,8 +19,8 @@ use crate::grid::brick::Plane;
 use crate::grid::{Axis, Key};
 use crate::mesh::TriangleSource;
 use crate::octree::crossings::{Sample, lattice_point};
-use crate::octree::signed::SignedOctree;
-use crate::progress::Progress;
+use crate::octree::signed::{GIVEN_BYTES, SignedOctree};
+use crate::progress::{Beside, Progress};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -79,7 +79,7 @@ impl Offset {
 /// The surface at a distance of the triangles of a source, of which `octree` was made in the same frame.
 ///
 /// # Errors
-/// As [`Offset::check`]; whatever the source returns; and `Cancelled`.
+/// As [`Offset::check`]; whatever the source returns; `Cancelled`, and `Memory` when `progress` says so.
 pub fn offset(
     octree: &SignedOctree,
     source: &mut dyn TriangleSource,
@@ -90,7 +90,11 @@ pub fn offset(
 ) -> Result<SignedOctree> {
     offset.check(frame)?;
     let distance = offset.distance() / frame.cell_size();
-    let band = Band::around(source, frame, distance.abs(), progress)?;
+    let beside = Beside { progress, bytes: octree.bytes() as u64 };
+    beside.hold(seed_bytes(octree.crossings().bricks().len()) as u64)?;
+    let band = Band::around(source, frame, distance.abs(), &beside)?;
+    let bricks = octree.crossings().bricks().len() + band.keys().len();
+    beside.hold((octree.bytes() + band.bytes() + bricks * GIVEN_BYTES) as u64)?;
     let nothing = SignedOctree::empty(frame.depth());
     let old = if matches!(offset, Offset::Shell(_)) { &nothing } else { octree };
     let moved = Moved { old, band: &band, distance };

@@ -90,7 +90,7 @@ impl Voxels {
     /// # Panics
     /// When there is none.
     pub fn value(&self, i: usize) -> f64 {
-        with_samples!(self, samples => f64::from(samples[i]))
+        with_samples!(self, samples => wide(samples[i]))
     }
 
     /// Bytes held.
@@ -102,12 +102,17 @@ impl Voxels {
     pub fn range(&self) -> Range {
         with_samples!(self, samples => {
             let of_piece = |piece: &[_]| {
-                let add = |range: Range, &value: &_| range.with(f64::from(value));
+                let add = |range: Range, &value: &_| range.with(wide(value));
                 piece.iter().fold(Range::EMPTY, add)
             };
             samples.par_chunks(PIECE).map(of_piece).reduce(|| Range::EMPTY, Range::merged)
         })
     }
+}
+
+/// Any sample as a double.
+fn wide(sample: impl Into<f64>) -> f64 {
+    sample.into()
 }
 
 /// What values there are.

@@ -120,7 +120,7 @@ pub(crate) fn open(
     }
     let mut input = Bounded::open(path)?;
     let read = start.elapsed();
-    let options = Options { max_memory: memory::limit(work.max_memory)?, ..work.options.clone() };
+    let options = Options { max_memory: memory::limit(work.max_memory)?, ..work.options };
     let (solid, report) = solidify(&mut input, &options, bars)?;
     let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read);
     let times = [("read", read)].into_iter().chain(stages.map(|&(stage, time)| (stage.name(), time))).collect();

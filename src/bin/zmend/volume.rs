@@ -5,6 +5,7 @@ use crate::print::Table;
 use crate::units::{self, real, vector};
 use glam::DVec3;
 use serde_json::{Value, json};
+use std::fmt::Write;
 use std::path::Path;
 use zmend::io::volume::{VolumeFormat, VolumeInfo, VolumeOptions, read_volume};
 use zmend::progress::Progress;
@@ -191,9 +192,11 @@ impl Told {
             "{name}: {}{array}\n{table}  the first sample is at {from}, the last one at {to}\n",
             self.info.format
         );
-        self.warnings().iter().for_each(|warning| text.push_str(&format!("  {warning}\n")));
+        self.warnings().iter().for_each(|warning| {
+            let _ = writeln!(text, "  {warning}");
+        });
         let middle = real(0.5 * (self.range.least + self.range.greatest));
-        text.push_str(&format!("to make a surface of it: zmend extract {name} OUT --iso {middle}\n"));
+        let _ = writeln!(text, "to make a surface of it: zmend extract {name} OUT --iso {middle}");
         text
     }
 

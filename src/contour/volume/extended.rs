@@ -72,7 +72,8 @@ struct Vertex {
 static CYCLES: LazyLock<Vec<Cycles>> = LazyLock::new(|| CASES.iter().map(cycles).collect());
 
 fn cycles(case: &Case) -> Cycles {
-    let numbers = |triangles: &[[Edge; 3]]| triangles.as_flattened().iter().map(|e| e.index() as u8).collect::<Vec<_>>();
+    let numbers =
+        |triangles: &[[Edge; 3]]| triangles.as_flattened().iter().map(|e| e.index() as u8).collect::<Vec<_>>();
     let corners: usize = case.cycles.iter().map(Vec::len).sum();
     let mut cycles = Cycles::default();
     // Discs have two triangles less than corners; a tunnel has as many.
@@ -284,7 +285,13 @@ impl<V: Volume> Extractor for Extended<'_, V> {
         });
     }
 
-    fn triangles(&self, Scratch { window, rows }: &mut Scratch, z: usize, first: impl Fn(usize) -> u32, out: &mut Vec<u32>) {
+    fn triangles(
+        &self,
+        Scratch { window, rows }: &mut Scratch,
+        z: usize,
+        first: impl Fn(usize) -> u32,
+        out: &mut Vec<u32>,
+    ) {
         let Some(next) = self.slices.get(z + 1) else { return };
         let slice = &self.slices[z];
         let before = z.checked_sub(1).map(|z| &self.slices[z]);

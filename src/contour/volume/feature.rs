@@ -86,7 +86,11 @@ mod tests {
 
     #[test]
     fn flat_pieces_have_no_feature() {
-        let bent = planes(&[([0.5, 0.0, 0.5], [0., 0.2, 1.]), ([0.0, 0.5, 0.5], [0.2, 0., 1.]), ([1.0, 0.5, 0.5], [0., 0., 1.])]);
+        let bent = planes(&[
+            ([0.5, 0.0, 0.5], [0., 0.2, 1.]),
+            ([0.0, 0.5, 0.5], [0.2, 0., 1.]),
+            ([1.0, 0.5, 0.5], [0., 0., 1.]),
+        ]);
         assert_eq!(feature(&bent, Sharpness::new(30.0), true), None);
         assert!(feature(&bent, Sharpness::new(10.0), true).is_some());
     }
@@ -106,7 +110,8 @@ mod tests {
 
     #[test]
     fn corners_are_where_all_planes_meet() {
-        let corner = [([0.2, 0.9, 0.1], [1., 0., 0.]), ([0.9, 0.3, 0.1], [0., 1., 0.]), ([0.9, 0.1, 0.6], [0., 0., 1.])];
+        let corner =
+            [([0.2, 0.9, 0.1], [1., 0., 0.]), ([0.9, 0.3, 0.1], [0., 1., 0.]), ([0.9, 0.1, 0.6], [0., 0., 1.])];
         let place = feature(&planes(&corner), Sharpness::new(30.0), true).unwrap();
         assert!(place.distance(Vec3A::new(0.2, 0.3, 0.6)) < 1e-5, "{place}");
     }

@@ -1,4 +1,4 @@
-//! NIfTI-1 (NIfTI Data Format Working Group, 2005): 348 bytes of header in either byte order, then the data, in one file (`.nii`) or in an
+//! `NIfTI-1` (`NIfTI` Data Format Working Group, 2005): 348 bytes of header in either byte order, then the data, in one file (`.nii`) or in an
 //! image file beside it (`.hdr` and `.img`).
 //!
 //! The lattice lies where the sform says, where there is none, where the qform says, else at the origin: methods 3, 2 and 1 of the standard.
@@ -16,7 +16,7 @@ use std::path::Path;
 /// Bytes of a header: the number that it begins with.
 const HEADER: usize = 348;
 
-/// The byte order of a file that begins as NIfTI files do.
+/// The byte order of a file that begins as `NIfTI` files do.
 fn order(head: &[u8]) -> Option<ByteOrder> {
     let first: [u8; 4] = *head.first_chunk()?;
     let order = [ByteOrder::Little, ByteOrder::Big].into_iter().find(|&order| {

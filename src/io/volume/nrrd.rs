@@ -61,6 +61,9 @@ fn files(value: &str) -> Option<Vec<String>> {
     numbered(pattern, first.parse().ok()?, last.parse().ok()?, step.parse().ok()?)
 }
 
+/// Kinds of axes along which samples lie.
+const IN_SPACE: [&str; 4] = ["domain", "space", "time", "???"];
+
 /// What is said of one axis.
 #[derive(Debug, Clone, Copy)]
 struct AxisOf {
@@ -191,7 +194,6 @@ fn axes(fields: &Fields<'_>) -> Result<Vec<AxisOf>> {
             Some(step) if mins[i].is_finite() => mins[i] / step + offset,
             _ => 0.0,
         };
-        const IN_SPACE: [&str; 4] = ["domain", "space", "time", "???"];
         let is_named = kinds.get(i).is_some_and(|kind| !IN_SPACE.contains(&kind.as_str()));
         let direction = match &directions {
             Some(directions) => directions.get(i).copied().ok_or_else(|| {

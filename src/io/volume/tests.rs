@@ -60,7 +60,7 @@ fn metaimages_are_read() {
 fn nrrd_files_are_read() {
     let with = |lines: &str, data: &[u8]| [NRRD.as_bytes(), lines.as_bytes(), b"\n", data].concat();
     let text = numbers().iter().map(i16::to_string).collect::<Vec<_>>().join("\n");
-    let hex: String = data(true).iter().map(|b| format!("{b:02x} ")).collect();
+    let hex = data(true).iter().map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" ");
     for bytes in [
         with("endian: little\nencoding: raw\n", &data(false)),
         with("endian: big\r\nencoding: raw\r\n", &data(true)),
@@ -84,6 +84,7 @@ fn nrrd_files_are_read() {
 
 #[test]
 fn nifti_files_are_read() {
+    let rows = [[0.0f32, -0.5, 0.0, 1.0], [2.0, 0.0, 0.0, -2.0], [0.0, 0.0, 4.0, 0.1]];
     let header = |big: bool| {
         let mut bytes = vec![0; 352];
         let mut put = |at: usize, number: &[u8]| {
@@ -99,15 +100,12 @@ fn nifti_files_are_read() {
         [1.0f32, 2.0, 0.5, 4.0].iter().zip(0..).for_each(|(n, i)| put(76 + 4 * i, &n.to_le_bytes()));
         put(108, &352.0f32.to_le_bytes());
         put(344, if big { b"\x001+n" } else { b"n+1\0" });
-        (bytes, put_rows())
+        bytes
     };
-    fn put_rows() -> [[f32; 4]; 3] {
-        [[0.0, -0.5, 0.0, 1.0], [2.0, 0.0, 0.0, -2.0], [0.0, 0.0, 4.0, 0.1]]
-    }
     for big in [false, true] {
         let number = |n: f32| if big { n.to_be_bytes() } else { n.to_le_bytes() };
         let code = |n: i16| if big { n.to_be_bytes() } else { n.to_le_bytes() };
-        let (mut bytes, rows) = header(big);
+        let mut bytes = header(big);
         bytes.extend(data(big));
         // Method 1: nothing but distances.
         let plain = read(&bytes).unwrap().image;

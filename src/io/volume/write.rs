@@ -73,7 +73,7 @@ fn meta(image: &Image) -> String {
     format!(
         "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
          TransformMatrix = {}\nOffset = {}\nElementSpacing = {}\nDimSize = {}\nElementType = {kind}\nElementDataFile = LOCAL\n",
-        words(directions.iter().flat_map(|d| d.to_array())),
+        words(directions.iter().flat_map(DVec3::to_array)),
         words(placement.origin.to_array()),
         words(spacing.to_array()),
         sizes(image),
