@@ -93,6 +93,9 @@ impl Loaded {
     /// The level that was asked for, if something is inside.
     fn level(&self, args: &VolumeArgs) -> Result<Level> {
         let Range { least, greatest, .. } = self.told.range;
+        if least > greatest {
+            return Err(Error::setting("volume", "all samples are not a number", "is the type of the samples right?"));
+        }
         let values = format!("values go from {} to {}", real(least), real(greatest));
         let Some(iso) = args.iso else {
             return Err(Error::setting(

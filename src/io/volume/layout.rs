@@ -132,7 +132,9 @@ impl Layout {
         let (voxels, trailing) = match &self.data {
             Data::Here(offset) => {
                 let (head, offset) = (source.head, *offset);
-                let mut reader = head.get(offset as usize..).unwrap_or(&[]).chain(source.rest);
+                let in_head = (head.len() as u64).min(offset);
+                skip_bytes(source.rest, offset - in_head).map_err(|e| Error::io(name, "read", e))?;
+                let mut reader = head[in_head as usize..].chain(source.rest);
                 let available = source.len.saturating_sub(offset);
                 self.voxels(name, &mut reader, available, source.is_packed, &samples, needed, progress)?
             }

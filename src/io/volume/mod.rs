@@ -143,7 +143,8 @@ use vti::is_vti;
 /// Without the feature, the name of the format is all that is known of it.
 #[cfg(not(feature = "volumes"))]
 fn is_vti(head: &[u8]) -> bool {
-    head[..head.len().min(4096)].windows(8).any(|window| window == b"<VTKFile")
+    let start = String::from_utf8_lossy(&head[..head.len().min(4096)]);
+    start.contains("<VTKFile") && start.contains("ImageData")
 }
 
 /// The error for what this build cannot read.

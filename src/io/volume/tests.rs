@@ -157,6 +157,10 @@ fn raw_samples_are_read_as_described() {
     let options = VolumeOptions { raw: Some("3x2x2:i16be:skip=2".parse().unwrap()), ..VolumeOptions::default() };
     let file = read_volume_bytes("t", &[&[1, 2], &data(true)[..]].concat(), &options, &Silent).unwrap();
     assert_eq!((file.info.format, file.image.voxels()), (VolumeFormat::Raw, image().voxels()));
+    // Also far behind what is read at once.
+    let options = VolumeOptions { raw: Some("3x2x2:i16le:skip=3000000".parse().unwrap()), ..VolumeOptions::default() };
+    let far = [&vec![7; 3_000_000][..], &data(false)].concat();
+    assert_eq!(read_volume_bytes("t", &far, &options, &Silent).unwrap().image.voxels(), image().voxels());
 }
 
 #[test]

@@ -16,10 +16,11 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::io::{self, ErrorKind, Read};
 
-/// Whether a file begins as VTK's XML files do.
+/// Whether a file begins as VTK's XML files of images do.
 pub(super) fn is_vti(head: &[u8]) -> bool {
     let start = &head[..head.len().min(4096)];
-    start.windows(8).any(|window| window == b"<VTKFile")
+    let has = |word: &[u8]| start.windows(word.len()).any(|window| window == word);
+    has(b"<VTKFile") && has(b"ImageData")
 }
 
 /// An array of numbers.
