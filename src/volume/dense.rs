@@ -223,7 +223,7 @@ mod tests {
             let floats: Vec<f32> = bytes.iter().map(|&b| if b == 7 { f32::NAN } else { f32::from(b) * 0.1 }).collect();
             compare(&floats[..whole], row, &[0.1, f64::from(0.1f32), 12.0, 1e300, -1e300, f64::INFINITY]);
             let doubles: Vec<f64> = bytes.iter().map(|&b| f64::from(b) * 0.1).collect();
-            compare(&doubles[..whole], row, &[0.1, 0.30000000000000004, 5.0]);
+            compare(&doubles[..whole], row, &[0.1, 0.1 * 3.0, 5.0]);
         }
     }
 

@@ -69,8 +69,6 @@ impl Level {
     #[inline]
     pub fn depth(self, value: f64) -> f64 {
         let depth = if self.below { self.iso - value } else { value - self.iso };
-        // A quarter of the greatest number: sums and differences of two depths stay finite.
-        const FAR: f64 = f64::MAX / 4.0;
         if depth.is_nan() { -FAR } else { depth.clamp(-FAR, FAR) }
     }
 
@@ -83,6 +81,9 @@ impl Level {
         if (0.0..=1.0).contains(&t) && (to - from).is_finite() { t } else { 0.5 }
     }
 }
+
+/// The greatest depth, a quarter of the greatest number: sums and differences of two depths stay finite.
+const FAR: f64 = f64::MAX / 4.0;
 
 /// A scalar field with samples on a lattice. Lattice points are `[x, y, z]`, each from 0 on, below the [size](Self::size).
 ///

@@ -74,6 +74,11 @@ impl CellPoint {
     }
 }
 
+/// Bytes held by the vertices of slices.
+pub(super) fn bytes(points: &[Vec<CellPoint>]) -> u64 {
+    points.iter().map(|points| size_of_val(&points[..]) as u64).sum()
+}
+
 /// What a thread reuses from slice to slice.
 pub(super) struct Scratch {
     window: Window,
@@ -84,7 +89,7 @@ pub(super) struct Scratch {
 /// The vertices of all cells: for each slice, those of its mixed cells in order, with as many for each cell as `polygons` has for its mask.
 /// `solve` finds the place of one, given its tangent planes and whether it is the only one of its cell.
 pub(super) fn place_all<V: Volume>(
-    lattice: &Lattice<V>,
+    lattice: &Lattice<'_, V>,
     slices: &[Slice],
     polygons: impl Fn(Mask) -> &'static [Vec<Edge>] + Sync,
     with_normals: bool,

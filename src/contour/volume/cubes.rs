@@ -94,7 +94,7 @@ impl<V: Volume> Extractor for Cubes<'_, V> {
 
 /// Appends the points on the crossed edges of a slice, in order, in model units.
 #[inline]
-pub(super) fn edge_points<V: Volume>(lattice: &Lattice<V>, slice: &Slice, z: usize, points: &mut Vec<DVec3>) {
+pub(super) fn edge_points<V: Volume>(lattice: &Lattice<'_, V>, slice: &Slice, z: usize, points: &mut Vec<DVec3>) {
     for y in 0..slice.rows() {
         for word in slice.row(y) {
             let first = [64 * word.x as usize, y, z];

@@ -15,7 +15,7 @@ use super::lattice::Lattice;
 use super::polygons::{self, Polygons};
 use super::rows::{CELLS, CellRows, Seen};
 use super::run::{Extractor, in_parallel};
-use super::slice::Slice;
+use super::slice::{Slice, bytes};
 use super::tangents::Planes;
 use crate::error::Result;
 use crate::grid::brick::Bits;
@@ -61,6 +61,7 @@ impl<'a, V: Volume> Dual<'a, V> {
             let solve = |planes: &Planes, _| CellPoint::new(planes.middle(), Kind::Smooth);
             place_all(lattice, slices, of_mask, false, solve, progress)?
         };
+        progress.hold(bytes(slices) + super::cell_points::bytes(&points))?;
         let mut dual = Dual { lattice, slices, points, polygons };
         if sharp {
             dual.separate(progress)?;

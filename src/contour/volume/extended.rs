@@ -16,7 +16,7 @@ use super::feature::{Sharpness, feature};
 use super::lattice::{Lattice, place};
 use super::rows::{CellRows, Seen};
 use super::run::Extractor;
-use super::slice::Slice;
+use super::slice::{Slice, bytes};
 use super::tangents::Planes;
 use super::window::Window;
 use crate::error::Result;
@@ -128,6 +128,8 @@ impl<'a, V: Volume> Extended<'a, V> {
             point.map_or_else(CellPoint::default, |point| CellPoint::new(point, Kind::Sharp))
         };
         let features = place_all(lattice, slices, |mask| &cycles[usize::from(mask)].list, true, solve, progress)?;
+        let of_ranks = features.iter().map(|points| (points.len() * size_of::<u32>()) as u64).sum::<u64>();
+        progress.hold(bytes(slices) + super::cell_points::bytes(&features) + of_ranks)?;
         let rank_all = |points: &Vec<CellPoint>| {
             let mut next = 0;
             let ranks = points.iter().map(|point| {

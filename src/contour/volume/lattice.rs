@@ -52,8 +52,7 @@ impl<'a, V: Volume> Lattice<'a, V> {
         match (self.sample(at), self.sample(to)) {
             (Some(at), Some(_)) => {
                 let t = self.volume.crossing(at, axis, self.level);
-                // Not a number makes the lesser bound.
-                t.max(CLEARANCE).min(1.0 - CLEARANCE)
+                if t > CLEARANCE { t.min(1.0 - CLEARANCE) } else { CLEARANCE }
             }
             _ => 0.5,
         }

@@ -1,6 +1,6 @@
 //! From slices to the sink: what all extractors have in common.
 
-use super::slice::Slice;
+use super::slice::{Slice, bytes};
 use super::sweep::Walker;
 use crate::error::{Error, Result};
 use crate::mesh::{MeshSink, MeshSizes};
@@ -42,7 +42,7 @@ pub(super) fn walk<W: Walker>(walker: &W, progress: &dyn Progress) -> Result<Vec
     let walk = |n| {
         check(progress)?;
         let slices = walker.walk(slab(n));
-        let bytes = slices.iter().map(|slice| slice.bytes() as u64).sum();
+        let bytes = bytes(&slices);
         progress.hold(held.fetch_add(bytes, Ordering::Relaxed) + bytes)?;
         progress.advance(slices.len() as u64);
         Ok(slices)

@@ -44,15 +44,20 @@ impl Slice {
     pub(crate) fn push(&mut self, x: u32, crossed: [u64; 3], mixed: u64, corners: &[u64; 8]) {
         self.words.push(Word { x, edge: self.edges, cell: self.masks.len() as u32, mixed, crossed });
         self.edges += crossed.iter().map(|bits| bits.count_ones()).sum::<u32>();
+        let (mut masks, mut count) = ([0; 64], 0);
         let mut left = mixed;
         while left != 0 {
             // Eight cells: their bits in eight words are eight masks, transposed.
             let shift = left.trailing_zeros() & !7;
             let bits = corners.map(|word| (word >> shift) as u8);
-            let masks = transposed(u64::from_le_bytes(bits)).to_le_bytes();
-            self.masks.extend(Bits(left >> shift & 0xff).map(|i| masks[i as usize]));
+            let eight = transposed(u64::from_le_bytes(bits));
+            for i in Bits(left >> shift & 0xff) {
+                masks[count] = (eight >> (8 * i)) as u8;
+                count += 1;
+            }
             left &= !(0xff << shift);
         }
+        self.masks.extend_from_slice(&masks[..count]);
     }
 
     /// Ends the current row.
@@ -91,6 +96,11 @@ impl Slice {
     pub(crate) fn bytes(&self) -> usize {
         self.words.capacity() * size_of::<Word>() + self.rows.capacity() * size_of::<u32>() + self.masks.capacity()
     }
+}
+
+/// Bytes held by slices.
+pub(crate) fn bytes(slices: &[Slice]) -> u64 {
+    slices.iter().map(|slice| slice.bytes() as u64).sum()
 }
 
 /// The corners of 64 cells that are inside, from the signs of the four rows round them: at y and z, y and z + 1, y + 1 and z, and at y + 1

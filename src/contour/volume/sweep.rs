@@ -39,7 +39,7 @@ impl Signs {
     }
 
     /// Fills in slice `z` of the lattice.
-    fn fill<V: Volume>(&mut self, lattice: &Lattice<V>, z: usize, level: Level) {
+    fn fill<V: Volume>(&mut self, lattice: &Lattice<'_, V>, z: usize, level: Level) {
         if !self.is_empty {
             self.words.fill(0);
         }
@@ -142,13 +142,13 @@ struct Valid {
 
 impl Valid {
     /// All of them.
-    fn new<V: Volume>(lattice: &Lattice<V>, words: usize) -> Self {
+    fn new<V: Volume>(lattice: &Lattice<'_, V>, words: usize) -> Self {
         let all = || vec![!0; words];
         let rows = || if lattice.volume.has_invalid_cells() { all() } else { Vec::new() };
         Valid { cells: all(), edges: [all(), all(), all()], beside: [rows(), rows(), rows()] }
     }
 
-    fn fill<V: Volume>(&mut self, lattice: &Lattice<V>, y: usize, z: usize) {
+    fn fill<V: Volume>(&mut self, lattice: &Lattice<'_, V>, y: usize, z: usize) {
         lattice.valid_cells(Some(y), Some(z), &mut self.cells);
         let [below, behind, both] = &mut self.beside;
         lattice.valid_cells(y.checked_sub(1), Some(z), below);

@@ -25,7 +25,7 @@ pub(super) struct Tangents {
 
 impl Tangents {
     /// Those of the slices `z` and `z + 1`. What is known of one of them already is kept.
-    pub(super) fn fill<V: Volume>(&mut self, lattice: &Lattice<V>, slices: &[Slice], z: usize, with_normals: bool) {
+    pub(super) fn fill<V: Volume>(&mut self, lattice: &Lattice<'_, V>, slices: &[Slice], z: usize, with_normals: bool) {
         if self.slices[1].0 == Some(z) {
             self.slices.swap(0, 1);
         }
@@ -54,7 +54,7 @@ impl Tangents {
 }
 
 fn tangents_of<V: Volume>(
-    lattice: &Lattice<V>,
+    lattice: &Lattice<'_, V>,
     slice: &Slice,
     z: usize,
     with_normals: bool,
