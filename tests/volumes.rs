@@ -257,6 +257,7 @@ fn the_program_says_what_is_wrong_with_volumes() {
     let shell = Shell::new();
     let image = bowl([33, 41, 25], Placement::with_spacing(DVec3::ZERO, DVec3::new(0.25, 0.25, 0.5)));
     write_volume(shell.path("bowl.nrrd"), &image, &Silent).unwrap();
+    shell.run("sample sphere s.ply").unwrap();
     for (args, words) in [
         ("extract bowl.nrrd a.ply", "iso: it is not said where the surface lies; values go from -"),
         ("extract bowl.nrrd a.ply --iso 300", "iso: no sample is above 300; values go from -"),
@@ -273,6 +274,9 @@ fn the_program_says_what_is_wrong_with_volumes() {
         ("topology bowl.nrrd a.ply --iso 0 --genus 0 --depth 6", "depth: bowl.nrrd has a grid of its own"),
         ("repair bowl.nrrd a.ply", "this is a volume (NRRD), not a mesh; `zmend extract bowl.nrrd OUT --iso VALUE`"),
         ("extract none.mhd a.ply --iso 0", "none.mhd: cannot read"),
+        ("extract s.ply a.ply --iso 0", "s.ply: the content is that of no volume that is known here"),
+        ("extract s.ply a.ply --genus 0", "s.ply: this is no volume; `zmend repair` takes meshes"),
+        ("topology s.ply a.ply --genus 0 --iso 1", "iso: s.ply is no volume"),
     ] {
         let error = shell.run(args).expect_err(args);
         assert!(error.contains(words), "{args}: {error}");

@@ -7,7 +7,7 @@ use crate::measure::Side;
 use crate::print::{self, Table};
 use crate::repair::after;
 use crate::solid::{self, Job, Work, verdict};
-use crate::volume::{Loaded, Told};
+use crate::volume::{Loaded, Told, is_volume};
 use crate::{digits, interrupt, json, memory, units};
 use serde_json::json;
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ use zmend::contour::volume::{Border, ExtractOptions, extract};
 use zmend::io::{self, Format, WriteOptions};
 use zmend::mesh::Bounds;
 use zmend::progress::{Progress, Stage};
-use zmend::{Error, Options, Result};
+use zmend::{Error, Options, Place, Result};
 
 pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
     let ExtractArgs { input, out, write, .. } = args;
@@ -35,6 +35,10 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
             };
             if args.open {
                 return of_octree("only surfaces made of the volume itself can be open", "leave --open away");
+            }
+            if !is_volume(input, Some(&args.volume))? {
+                let remedy = "`zmend repair` takes meshes; of samples without a header say what they are: --raw";
+                return Err(Error::format(input.display().to_string(), Place::Whole, "this is no volume", remedy));
             }
             let options = Options { surface, ..Options::default() };
             let given = args.cell.map(|_| "cell");

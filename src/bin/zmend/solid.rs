@@ -99,6 +99,10 @@ pub(crate) fn open(
     let from = OctreeFormat::of_file(path)?;
     let has_grid = || format!("{} has a grid of its own", path.display());
     let is_volume = volume::is_volume(path, volume)?;
+    if let (false, Some(option)) = (is_volume, volume.and_then(VolumeArgs::given)) {
+        let problem = format!("{} is no volume", path.display());
+        return Err(Error::setting(option, problem, "leave this option away, or say what it is with --raw"));
+    }
     if let (true, Some(option)) = (from.is_some(), work.given) {
         return Err(Error::setting(option, has_grid(), "leave this option away"));
     }

@@ -372,9 +372,12 @@ impl Parts {
             let problem = "the data are in another file, and there is no folder to look for it";
             return Err(Error::format(name, Place::Whole, problem, "read it as a file, by its path"));
         };
+        if names.is_empty() {
+            return Err(Error::format(name, Place::Whole, "the list of data files is empty", "export the file again"));
+        }
         let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
         let mut parts = Parts { paths, ranges: Vec::new(), next: 0, file: None, len: 0 };
-        let each = needed / (names.len() as u64).max(1);
+        let each = needed / names.len() as u64;
         for path in &parts.paths.clone() {
             let metadata = std::fs::metadata(path).map_err(|e| {
                 let problem = format!("the data are said to be in {}, which cannot be read ({e})", path.display());

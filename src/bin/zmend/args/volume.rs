@@ -89,6 +89,17 @@ impl VolumeArgs {
         VolumeOptions { array: self.array.clone(), channel: self.channel, raw: self.raw }
     }
 
+    /// One of the options that only volumes have, if any was given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("iso", self.iso.is_some()),
+            ("array", self.array.is_some()),
+            ("channel", self.channel.is_some()),
+            ("spacing", self.spacing.is_some()),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(option, _)| option)
+    }
+
     /// Whether a file is a volume because it is said to be.
     pub(crate) fn is_raw(&self) -> bool {
         self.raw.is_some()
