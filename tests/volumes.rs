@@ -101,7 +101,7 @@ fn noise_loses_its_handles_by_few_cells() {
     let part = Cropped::new(&channels, [40, 40, 20], [100, 100, 60]).unwrap();
     let part = Solid::from_volume(&part, Level::above(1.0), DVec3::ZERO, 1.0, &Silent).unwrap();
     for (name, solid, handles, cells) in
-        [("head", solid(head, Level::above(41.0)), 76, 200), ("channels", part, 400, 900)]
+        [("head", solid(head, Level::above(41.0)), 76, 200), ("channels", part, 200, 600)]
     {
         let changed = |options: Repair| {
             let (solid, report) = solid.clone().mended(&options, &Silent).unwrap();
@@ -116,17 +116,17 @@ fn noise_loses_its_handles_by_few_cells() {
             );
             report.changed_cells
         };
-        let least = changed(Repair { genus: Some(0), ..Repair::default() });
+        let by_area = changed(Repair { genus: Some(0), ..Repair::default() });
         let cut = changed(Repair { cut: Some(f64::INFINITY), ..Repair::default() });
-        println!("{name}: {least} cells changed, {cut} by cuts alone");
-        assert!(least <= cells && least < cut, "{name}: {least} {cut}");
+        println!("{name}: {by_area} cells changed, {cut} by cuts alone");
+        assert!(by_area <= cells && cut <= cells, "{name}: {by_area} {cut}");
     }
 }
 
-/// A bowl: a ball with a smaller one taken away from its top, cut by the border of the volume.
-fn bowl(size: [usize; 3], placement: Placement) -> Image {
-    let middle = DVec3::new(4.0, 5.0, 6.0);
-    let value = |p: DVec3| (5.5 - p.distance(middle)).min(p.distance(middle + DVec3::new(0.5, 1.0, 3.0)) - 3.0);
+/// A ball with a smaller one on top, cut by five of the sides of the box of 8 x 10 x 12.
+fn lump(size: [usize; 3], placement: Placement) -> Image {
+    let middle = DVec3::new(4.1, 5.05, 6.02);
+    let value = |p: DVec3| (5.37 - p.distance(middle)).max(2.13 - p.distance(middle + DVec3::new(1.3, 2.1, 4.4)));
     let [nx, ny, nz] = size;
     let point = |i: usize| DVec3::from([i % nx, i / nx % ny, i / nx / ny].map(|c| c as f64));
     let samples = (0..nx * ny * nz).map(|i| value(placement.to_model(point(i)))).collect();
@@ -136,14 +136,14 @@ fn bowl(size: [usize; 3], placement: Placement) -> Image {
 #[test]
 fn world_coordinates_do_not_depend_on_the_lattice() {
     let level = Level::above(0.0);
-    let plain = bowl([33, 41, 49], Placement::with_spacing(DVec3::ZERO, DVec3::splat(0.25)));
+    let plain = lump([33, 41, 49], Placement::with_spacing(DVec3::ZERO, DVec3::splat(0.25)));
     let expected = extracted(&plain, level, Method::MarchingCubes);
     let at_border = extracted(&plain, level, Method::SurfaceNets).points.iter().any(|p| p.x < 0.0);
     assert!(check(&expected).is_ok() && at_border);
     let size = volume(&expected);
     // The same samples, exchanged and turned round: the same surface.
     let axes = DMat3::from_cols(DVec3::new(0.0, 0.0, -0.25), DVec3::new(0.25, 0.0, 0.0), DVec3::new(0.0, 0.25, 0.0));
-    let turned = bowl([49, 33, 41], Placement { origin: DVec3::new(0.0, 0.0, 12.0), axes });
+    let turned = lump([49, 33, 41], Placement { origin: DVec3::new(0.0, 0.0, 12.0), axes });
     for method in [Method::MarchingCubes, Method::Trilinear, Method::DualContouring, Method::SurfaceNets] {
         let mesh = extracted(&turned, level, method);
         assert_eq!(check(&mesh), check(&expected));
@@ -151,14 +151,14 @@ fn world_coordinates_do_not_depend_on_the_lattice() {
     }
     let through = surface(&solid(turned, level), Surface::MarchingCubes);
     assert_eq!((through.points.len(), through.faces.len()), (expected.points.len(), expected.faces.len()));
-    // Other lattices, with and without the octree: the slanted one holds a little more of the bowl.
+    // Other lattices, with and without the octree: the slanted one holds a little more of the lump.
     let anisotropic = Placement::with_spacing(DVec3::ZERO, DVec3::new(0.25, 0.2, 0.5));
     let slanted = DMat3::from_cols(DVec3::new(0.25, 0.0, 0.0), DVec3::new(0.05, 0.25, 0.0), DVec3::new(0.0, 0.0, 0.25));
     let slanted = Placement { origin: DVec3::new(-2.0, 0.0, 0.0), axes: slanted };
     for (size_of, placement, least, most) in
         [([33, 51, 25], anisotropic, 0.95, 1.05), ([41, 41, 49], slanted, 1.0, 1.2)]
     {
-        let image = bowl(size_of, placement);
+        let image = lump(size_of, placement);
         let meshes =
             [extracted(&image, level, Method::MarchingCubes), surface(&solid(image, level), Surface::MarchingCubes)];
         let volumes = meshes.each_ref().map(volume);
@@ -170,7 +170,7 @@ fn world_coordinates_do_not_depend_on_the_lattice() {
 
 #[test]
 fn open_borders_have_a_rim() {
-    let image = bowl([33, 41, 49], Placement::with_spacing(DVec3::ZERO, DVec3::splat(0.25)));
+    let image = lump([33, 41, 49], Placement::with_spacing(DVec3::ZERO, DVec3::splat(0.25)));
     let options = ExtractOptions { border: Border::Open, placement: image.placement(), ..ExtractOptions::default() };
     let mut mesh = Mesh::default();
     extract(&image, &options, &mut mesh, &Silent).unwrap();
@@ -211,44 +211,44 @@ impl Shell {
 fn the_program_extracts_volumes() {
     let shell = Shell::new();
     let placement = Placement::with_spacing(DVec3::ZERO, DVec3::new(0.25, 0.25, 0.5));
-    let image = bowl([33, 41, 25], placement);
-    write_volume(shell.path("bowl.mha"), &image, &Silent).unwrap();
-    let info = shell.run("info bowl.mha").unwrap();
+    let image = lump([33, 41, 25], placement);
+    write_volume(shell.path("lump.mha"), &image, &Silent).unwrap();
+    let info = shell.run("info lump.mha").unwrap();
     assert!(info.contains("MetaImage") && info.contains("33 x 41 x 25 of f64") && info.contains("--iso"), "{info}");
-    assert_eq!(shell.json("info bowl.mha")["size"], serde_json::json!([33, 41, 25]));
+    assert_eq!(shell.json("info lump.mha")["size"], serde_json::json!([33, 41, 25]));
 
     for method in ["mc", "mc33", "dc", "nets", "emc"] {
-        let told = shell.json(&format!("extract bowl.mha {method}.ply --iso 0 --method {method}"));
+        let told = shell.json(&format!("extract lump.mha {method}.ply --iso 0 --method {method}"));
         assert_eq!((&told["output"]["solid"], &told["options"]["method"]), (&true.into(), &method.into()), "{told}");
         let mesh = zmend::io::read(shell.path(&format!("{method}.ply"))).unwrap();
         assert_eq!(check(&mesh).unwrap().genus(), 0);
     }
-    let told = shell.run("extract bowl.mha open.ply --iso 0 --open").unwrap();
-    assert!(told.contains("bowl.mha -> open.ply: PLY, what is above 0") && told.contains("4 holes"), "{told}");
+    let told = shell.run("extract lump.mha open.ply --iso 0 --open").unwrap();
+    assert!(told.contains("lump.mha -> open.ply: PLY, what is above 0") && told.contains("5 holes"), "{told}");
     // What is below is the rest of the box.
-    let told = shell.json("extract bowl.mha below.ply --iso 0 --below");
-    let above = shell.json("extract bowl.mha above.ply --iso 0");
+    let told = shell.json("extract lump.mha below.ply --iso 0 --below");
+    let above = shell.json("extract lump.mha above.ply --iso 0");
     let sum = [&told, &above].map(|told| told["output"]["volume"].as_f64().unwrap()).iter().sum::<f64>();
     assert!((sum - 33.0 * 41.0 * 25.0 * 0.25 * 0.25 * 0.5).abs() < 5.0, "{sum}");
     // Spacing on the command line goes before the file's.
-    let told = shell.json("extract bowl.mha above.ply --iso 0 --spacing 0.5,0.5,1 --force");
+    let told = shell.json("extract lump.mha above.ply --iso 0 --spacing 0.5,0.5,1 --force");
     let ratio = told["output"]["volume"].as_f64().unwrap() / above["output"]["volume"].as_f64().unwrap();
     assert!((ratio - 8.0).abs() < 1e-3, "{ratio}");
 
     // Topology goes by cubes; octrees can be written.
-    let told = shell.json("extract bowl.mha fixed.ply --iso 0 --genus 0");
+    let told = shell.json("extract lump.mha fixed.ply --iso 0 --genus 0");
     assert_eq!((&told["input"]["resampled"], &told["output"]["solid"]), (&0.25.into(), &true.into()), "{told}");
     assert_eq!(told["warnings"][0], "the volume was sampled anew, on cubes 0.25 wide");
-    assert_eq!(shell.json("topology bowl.mha listed.ply --iso 0 --cut 1")["topology"]["after"]["handles"], 0);
-    let listed = shell.json("topology bowl.mha --list --iso 0 --cell 0.5");
+    assert_eq!(shell.json("topology lump.mha listed.ply --iso 0 --cut 1")["topology"]["after"]["handles"], 0);
+    let listed = shell.json("topology lump.mha --list --iso 0 --cell 0.5");
     assert_eq!((&listed["topology"]["components"], &listed["grid"]["cell_size"]), (&1.into(), &0.5.into()));
-    shell.run("extract bowl.mha bowl.sog --iso 0").unwrap();
-    assert!(shell.run("info bowl.sog").unwrap().contains("SOG"));
+    shell.run("extract lump.mha lump.sog --iso 0").unwrap();
+    assert!(shell.run("info lump.sog").unwrap().contains("SOG"));
 
     let Voxels::F64(samples) = image.voxels() else { panic!("doubles were given") };
     let bytes: Vec<u8> = samples.iter().flat_map(|sample| (*sample as f32).to_be_bytes()).collect();
-    std::fs::write(shell.path("bowl.raw"), bytes).unwrap();
-    let raw = shell.json("extract bowl.raw raw.ply --iso 0 --raw 33x41x25:f32be --spacing 0.25,0.25,0.5");
+    std::fs::write(shell.path("lump.raw"), bytes).unwrap();
+    let raw = shell.json("extract lump.raw raw.ply --iso 0 --raw 33x41x25:f32be --spacing 0.25,0.25,0.5");
     let volumes = [&raw, &above].map(|told| told["output"]["volume"].as_f64().unwrap());
     assert!((volumes[0] - volumes[1]).abs() < 1e-3 * volumes[1], "{volumes:?}");
 }
@@ -256,24 +256,24 @@ fn the_program_extracts_volumes() {
 #[test]
 fn the_program_says_what_is_wrong_with_volumes() {
     let shell = Shell::new();
-    let image = bowl([33, 41, 25], Placement::with_spacing(DVec3::ZERO, DVec3::new(0.25, 0.25, 0.5)));
-    write_volume(shell.path("bowl.nrrd"), &image, &Silent).unwrap();
+    let image = lump([33, 41, 25], Placement::with_spacing(DVec3::ZERO, DVec3::new(0.25, 0.25, 0.5)));
+    write_volume(shell.path("lump.nrrd"), &image, &Silent).unwrap();
     shell.run("sample sphere s.ply").unwrap();
     for (args, words) in [
-        ("extract bowl.nrrd a.ply", "iso: it is not said where the surface lies; values go from -"),
-        ("extract bowl.nrrd a.ply --iso 300", "iso: no sample is above 300; values go from -"),
-        ("extract bowl.nrrd a.ply --iso -300 --below", "iso: no sample is below -300"),
-        ("extract bowl.nrrd a.ply --iso x", "not a finite number"),
-        ("extract bowl.nrrd a.ply --iso 0 --array b", "array: bowl.nrrd is NRRD, whose arrays have no names"),
-        ("extract bowl.nrrd a.ply --iso 0 --channel 1", "there is no channel 1: samples have 1"),
-        ("extract bowl.nrrd a.ply --iso 0 --raw 9x9", "raw: \"9x9\" does not describe samples"),
-        ("extract bowl.nrrd a.ply --iso 0 --raw 99x99x99:f64", "take 7762392 bytes, and there are only"),
-        ("extract bowl.nrrd a.ply --iso 0 --genus 0 --method emc", "have no such surface; take mc, dc or nets"),
-        ("extract bowl.nrrd a.ply --iso 0 --genus 0 --open", "leave --open away"),
-        ("extract bowl.nrrd a.ply --iso 0 --max-memory 1K", "max-memory"),
-        ("extract bowl.nrrd bowl.nrrd --iso 0", "name says no format to write"),
-        ("topology bowl.nrrd a.ply --iso 0 --genus 0 --depth 6", "depth: bowl.nrrd has a grid of its own"),
-        ("repair bowl.nrrd a.ply", "this is a volume (NRRD), not a mesh; `zmend extract bowl.nrrd OUT --iso VALUE`"),
+        ("extract lump.nrrd a.ply", "iso: it is not said where the surface lies; values go from -"),
+        ("extract lump.nrrd a.ply --iso 300", "iso: no sample is above 300; values go from -"),
+        ("extract lump.nrrd a.ply --iso -300 --below", "iso: no sample is below -300"),
+        ("extract lump.nrrd a.ply --iso x", "not a finite number"),
+        ("extract lump.nrrd a.ply --iso 0 --array b", "array: lump.nrrd is NRRD, whose arrays have no names"),
+        ("extract lump.nrrd a.ply --iso 0 --channel 1", "there is no channel 1: samples have 1"),
+        ("extract lump.nrrd a.ply --iso 0 --raw 9x9", "raw: \"9x9\" does not describe samples"),
+        ("extract lump.nrrd a.ply --iso 0 --raw 99x99x99:f64", "take 7762392 bytes, and there are only"),
+        ("extract lump.nrrd a.ply --iso 0 --genus 0 --method emc", "have no such surface; take mc, dc or nets"),
+        ("extract lump.nrrd a.ply --iso 0 --genus 0 --open", "leave --open away"),
+        ("extract lump.nrrd a.ply --iso 0 --max-memory 1K", "max-memory"),
+        ("extract lump.nrrd lump.nrrd --iso 0", "name says no format to write"),
+        ("topology lump.nrrd a.ply --iso 0 --genus 0 --depth 6", "depth: lump.nrrd has a grid of its own"),
+        ("repair lump.nrrd a.ply", "this is a volume (NRRD), not a mesh; `zmend extract lump.nrrd OUT --iso VALUE`"),
         ("extract none.mhd a.ply --iso 0", "none.mhd: cannot read"),
         ("extract s.ply a.ply --iso 0", "s.ply: the content is that of no volume that is known here"),
         ("extract s.ply a.ply --genus 0", "s.ply: this is no volume; `zmend repair` takes meshes"),
