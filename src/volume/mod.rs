@@ -12,6 +12,7 @@
 //! | a continuous function of the place, of which surface and normals shall be exact | [`LevelSet`] |
 //! | a part of another volume | [`Cropped`] |
 //! | samples of any number type that are owned, with their place: what files are read into | [`Image`] |
+//! | one of several materials, told apart by their numbers | [`Label`] |
 //!
 //! # Inside
 //!
@@ -28,11 +29,13 @@ pub mod cubic;
 mod dense;
 mod field;
 pub mod image;
+mod label;
 mod placement;
 
 pub use dense::{Dense, Sample};
 pub use field::{Cropped, LevelSet, Samples};
 pub use image::{Image, Voxels};
+pub use label::Label;
 pub use placement::Placement;
 
 use crate::grid::Axis;
@@ -140,6 +143,17 @@ pub trait Volume: Sync {
         differences(self, place)
     }
 
+    /// Whether there are several [materials](Self::material).
+    fn has_materials(&self) -> bool {
+        false
+    }
+
+    /// The number of the material at a lattice point, of which one is inside. Surface nets have one place for all vertices in a cell, halfway
+    /// between the materials, so that the surfaces of all of them fit together. Only called if there [are any](Self::has_materials).
+    fn material(&self, at: [usize; 3]) -> f64 {
+        self.value(at)
+    }
+
     /// Whether [`valid_cells`](Self::valid_cells) leaves out any.
     fn has_invalid_cells(&self) -> bool {
         false
@@ -170,6 +184,12 @@ impl<V: Volume + ?Sized> Volume for &V {
     fn gradient(&self, place: DVec3) -> DVec3 {
         (**self).gradient(place)
     }
+    fn has_materials(&self) -> bool {
+        (**self).has_materials()
+    }
+    fn material(&self, at: [usize; 3]) -> f64 {
+        (**self).material(at)
+    }
     fn has_invalid_cells(&self) -> bool {
         (**self).has_invalid_cells()
     }
@@ -183,19 +203,14 @@ impl<V: Volume + ?Sized> Volume for &V {
 fn differences<V: Volume + ?Sized>(volume: &V, place: DVec3) -> DVec3 {
     let size = volume.size();
     let low: [usize; 3] = std::array::from_fn(|a| (place[a].max(0.0) as usize).min(size[a].saturating_sub(1)));
+    let t: [f64; 3] = std::array::from_fn(|a| place[a] - low[a] as f64);
+    // The axes along which the place is between lattice points.
+    let between = (0..3).fold(0, |axes, a| axes | usize::from(t[a] > 0.0 && low[a] + 1 < size[a]) << a);
     let mut sum = DVec3::ZERO;
-    for corner in 0..8 {
-        let mut at = low;
-        let mut weight = 1.0;
-        for axis in 0..3 {
-            let t = place[axis] - low[axis] as f64;
-            let is_high = corner >> axis & 1 == 1;
-            weight *= if is_high { t } else { 1.0 - t };
-            at[axis] += usize::from(is_high);
-        }
-        if weight > 0.0 && (0..3).all(|a| at[a] < size[a]) {
-            sum += weight * difference_at(volume, at, size);
-        }
+    for corner in (0..8).filter(|corner| corner & !between == 0) {
+        let at: [usize; 3] = std::array::from_fn(|a| low[a] + (corner >> a & 1));
+        let weights = (0..3).filter(|a| between >> a & 1 == 1).map(|a| if at[a] > low[a] { t[a] } else { 1.0 - t[a] });
+        sum += weights.product::<f64>() * difference_at(volume, at, size);
     }
     sum
 }

@@ -87,13 +87,13 @@ pub(super) struct Scratch {
 }
 
 /// The vertices of all cells: for each slice, those of its mixed cells in order, with as many for each cell as `polygons` has for its mask.
-/// `solve` finds the place of one, given its tangent planes and whether it is the only one of its cell.
+/// `solve` finds the place of one, given its tangent planes, its cell, and whether it is the only one there.
 pub(super) fn place_all<V: Volume>(
     lattice: &Lattice<'_, V>,
     slices: &[Slice],
     polygons: impl Fn(Mask) -> &'static [Vec<Edge>] + Sync,
     with_normals: bool,
-    solve: impl Fn(&Planes, bool) -> CellPoint + Sync,
+    solve: impl Fn(&Planes, [usize; 3], bool) -> CellPoint + Sync,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec<CellPoint>>> {
     let scratch =
@@ -110,12 +110,13 @@ pub(super) fn place_all<V: Volume>(
             for word in slice.row(y).iter().filter(|word| word.mixed != 0) {
                 window.go_to(&mut row, [slice, next], [0, tangents.first()], y);
                 for (x, &mask) in Bits(word.mixed).zip(&mut masks) {
-                    let number = window.at(64 * word.x as usize + x as usize);
+                    let x = 64 * word.x as usize + x as usize;
+                    let number = window.at(x);
                     let polygons = polygons(mask);
                     let is_alone = polygons.len() == 1;
                     for polygon in polygons {
                         planes.fill(polygon, |edge| tangents.get(number(edge.index() as u8)), &to_unit);
-                        points.push(solve(planes, is_alone));
+                        points.push(solve(planes, [x, y, z], is_alone));
                     }
                 }
             }

@@ -52,13 +52,21 @@ impl<'a, V: Volume> Dual<'a, V> {
         let polygons: &'static [Polygons] = &POLYGONS;
         let of_mask = |mask| &polygons[usize::from(mask)].list[..];
         let points = if sharp {
-            let solve = |planes: &Planes, is_alone| {
+            let solve = |planes: &Planes, _, is_alone| {
                 let (place, is_creased) = planes.solve(is_alone);
                 CellPoint::new(place, if is_creased { Kind::Sharp } else { Kind::Smooth })
             };
             place_all(lattice, slices, of_mask, true, solve, progress)?
         } else {
-            let solve = |planes: &Planes, _| CellPoint::new(planes.middle(), Kind::Smooth);
+            let solve = |planes: &Planes, cell, is_alone| {
+                let place = if lattice.volume.has_materials() {
+                    let place = lattice.between_materials(cell).as_vec3a();
+                    if is_alone { place } else { planes.apart(place) }
+                } else {
+                    planes.middle()
+                };
+                CellPoint::new(place, Kind::Smooth)
+            };
             place_all(lattice, slices, of_mask, false, solve, progress)?
         };
         progress.hold(bytes(slices) + super::cell_points::bytes(&points))?;

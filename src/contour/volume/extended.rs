@@ -123,7 +123,7 @@ impl<'a, V: Volume> Extended<'a, V> {
     ) -> Result<Self> {
         let cycles: &'static [Cycles] = &CYCLES;
         let sharpness = Sharpness::new(angle);
-        let solve = |planes: &Planes, is_alone: bool| {
+        let solve = |planes: &Planes, _, is_alone| {
             let point = feature(planes, sharpness, is_alone);
             point.map_or_else(CellPoint::default, |point| CellPoint::new(point, Kind::Sharp))
         };

@@ -1,6 +1,6 @@
 //! Whether there is a feature in a polygon, and where.
 
-use super::tangents::{Planes, within_reach};
+use super::tangents::{Planes, within_cell, within_reach};
 use crate::geom::qef::Qef;
 use glam::{DMat2, DMat3, DVec2, DVec3, Vec3A};
 
@@ -41,6 +41,7 @@ pub(super) fn feature(planes: &Planes, sharpness: Sharpness, is_alone: bool) -> 
     let mut sum = Qef::EMPTY;
     planes.list.iter().for_each(|&(point, normal)| sum += &Qef::of_plane(point, normal));
     let place = within_reach(&sum, free, true);
+    let place = if planes.has_fan(place) { place } else { within_cell(&sum) };
     Some(if is_alone { place } else { planes.apart(place) })
 }
 

@@ -1,6 +1,6 @@
 //! A volume as extractors see it: with a layer of outside round it where the surface shall be closed, and a place in the model.
 
-use crate::grid::Axis;
+use crate::grid::{Axis, Corner, Edge};
 use crate::volume::{Level, Placement, Volume};
 use glam::{DMat3, DVec3};
 
@@ -61,6 +61,23 @@ impl<'a, V: Volume> Lattice<'a, V> {
     /// How far a lattice point is inside; in the border, one unit outside.
     pub(crate) fn depth(&self, at: [usize; 3]) -> f64 {
         self.sample(at).map_or(-1.0, |at| self.level.depth(self.volume.value(at)))
+    }
+
+    /// Halfway between the materials in a cell, in coordinates of the cell: the mean of the middles of its edges whose ends differ. All beyond
+    /// the border is one more material.
+    pub(crate) fn between_materials(&self, cell: [usize; 3]) -> DVec3 {
+        let at = |corner: Corner| std::array::from_fn(|a| cell[a] + usize::from(corner & Axis::ALL[a]));
+        // Bits, for what is not a number differs from itself.
+        let materials = Corner::ALL.map(|corner| self.sample(at(corner)).map(|at| self.volume.material(at).to_bits()));
+        let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+        for edge in Edge::ALL {
+            let [low, high] = edge.corners();
+            if materials[low.index()] != materials[high.index()] {
+                sum += 0.5 * (place(at(low)) + place(at(high))) - place(cell);
+                count += 1.0;
+            }
+        }
+        sum / count
     }
 
     /// The cells of a row that may hold surface, among them those of the border; none where there is no row.

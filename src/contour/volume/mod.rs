@@ -8,7 +8,8 @@
 //! | part | done by |
 //! |---|---|
 //! | `sweep` | the walker: every sample once, as rows of bits, in slabs on all threads |
-//! | `slice` | its product: words of crossed edges and mixed cells, only where there is surface |
+//! | `bricks` | another walker, over the bricks of an octree, which it takes as a volume |
+//! | `slice` | their product: words of crossed edges and mixed cells, only where there is surface |
 //! | `lattice` | the volume with a border round it and a place in the model |
 //! | `run` | numbers points and faces slice by slice and passes them on in order |
 //! | `window` | the numbers of the points round a row of cells, kept in the first cache |
@@ -28,6 +29,7 @@
 //! - Memory is that of the signs of two slices for each thread, and a few bytes for each face while it is made.
 //! - The same volume gives the same bytes on any number of threads.
 
+mod bricks;
 mod cell_points;
 mod cubes;
 mod dual;
@@ -46,10 +48,14 @@ mod trilinear;
 mod window;
 
 use crate::error::{Error, Result, Short};
+use crate::geom::Frame;
 use crate::mesh::{MeshSink, MeshSizes};
+use crate::octree::SignedOctree;
 use crate::progress::Progress;
-use crate::volume::{Level, Placement, Volume};
+use crate::volume::{Label, Level, Placement, Volume};
+use bricks::Bricks;
 use lattice::Lattice;
+use slice::Slice;
 
 /// How the surface is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -77,7 +83,7 @@ pub enum Border {
     /// It is closed half a step beyond the last samples: all beyond the volume counts as outside.
     #[default]
     Closed,
-    /// It ends at the last samples, with a rim.
+    /// It ends at the last samples, with a rim. Dual surfaces end half a cell before, and may have points there that no face uses.
     Open,
 }
 
@@ -109,6 +115,23 @@ impl Default for ExtractOptions {
     }
 }
 
+impl ExtractOptions {
+    fn check(&self) -> Result<()> {
+        if self.level.iso.is_nan() {
+            return Err(Error::setting(
+                "iso",
+                "the level is not a number",
+                "give a number between those of the volume",
+            ));
+        }
+        if !(self.feature_angle > 0.0 && self.feature_angle < 90.0) {
+            let problem = format!("{} is not above 0 and below 90", Short(self.feature_angle));
+            return Err(Error::setting("feature-angle", problem, "30 is the default"));
+        }
+        self.placement.check()
+    }
+}
+
 /// Passes the surface of a volume to `sink` as triangles; returns its size. Without any sample inside, that is an empty mesh.
 ///
 /// ```
@@ -135,26 +158,75 @@ pub fn extract<V: Volume>(
     sink: &mut (dyn MeshSink + Send),
     progress: &dyn Progress,
 ) -> Result<MeshSizes> {
-    if options.level.iso.is_nan() {
-        return Err(Error::setting("iso", "the level is not a number", "give a number between those of the volume"));
-    }
-    if !(options.feature_angle > 0.0 && options.feature_angle < 90.0) {
-        let problem = format!("{} is not above 0 and below 90", Short(options.feature_angle));
-        return Err(Error::setting("feature-angle", problem, "30 is the default"));
-    }
-    options.placement.check()?;
+    options.check()?;
     let lattice = Lattice::new(volume, options.level, options.placement, options.border == Border::Closed);
     let slices = run::walk(&lattice, progress)?;
+    contour(&lattice, &slices, options, sink, progress)
+}
+
+/// The surface in slices, by the method asked for.
+fn contour<V: Volume>(
+    lattice: &Lattice<'_, V>,
+    slices: &[Slice],
+    options: &ExtractOptions,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
     match options.method {
-        Method::MarchingCubes => run::pass_on(&cubes::Cubes::new(&lattice, &slices), &slices, sink, progress),
-        Method::Trilinear => run::pass_on(&trilinear::Trilinear::new(&lattice, &slices), &slices, sink, progress),
+        Method::MarchingCubes => run::pass_on(&cubes::Cubes::new(lattice, slices), slices, sink, progress),
+        Method::Trilinear => run::pass_on(&trilinear::Trilinear::new(lattice, slices), slices, sink, progress),
         Method::DualContouring | Method::SurfaceNets => {
-            let dual = dual::Dual::new(&lattice, &slices, options.method == Method::DualContouring, progress)?;
-            run::pass_on(&dual, &slices, sink, progress)
+            let dual = dual::Dual::new(lattice, slices, options.method == Method::DualContouring, progress)?;
+            run::pass_on(&dual, slices, sink, progress)
         }
         Method::ExtendedMarchingCubes => {
-            let extended = extended::Extended::new(&lattice, &slices, options.feature_angle, progress)?;
-            run::pass_on(&extended, &slices, sink, progress)
+            let extended = extended::Extended::new(lattice, slices, options.feature_angle, progress)?;
+            run::pass_on(&extended, slices, sink, progress)
         }
     }
+}
+
+/// Passes the surface of one material to `sink`, of a volume whose samples are numbers of materials: by surface nets, whatever level and
+/// method `options` say.
+///
+/// The surfaces of all materials fit together: where two of them touch, both have the same triangles, turned to either side, also along the lines
+/// where three or more meet. Only where a material touches itself along an edge or in a point, its surface keeps a 64th of a cell apart, so that
+/// it is a manifold.
+///
+/// # Errors
+/// As [`extract`].
+pub fn extract_label<V: Volume>(
+    labels: &V,
+    label: f64,
+    options: &ExtractOptions,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
+    let options = ExtractOptions { level: Label::<&V>::LEVEL, method: Method::SurfaceNets, ..*options };
+    extract(&Label::new(labels, label), &options, sink, progress)
+}
+
+/// Passes the surface of an octree to `sink`, by any of the methods for volumes: samples are 1 inside and -1 outside, points are its crossings, and
+/// normals those of the crossings, if it has any. Only its bricks are looked at.
+///
+/// Level, border and placement of `options` do not matter: the octree has its signs, all of its border is outside, and `frame` says where it lies.
+/// For the surfaces of repairs see [`marching_cubes`](super::marching_cubes) and [`dual_contouring`](super::dual_contouring), which know more
+/// of octrees.
+///
+/// # Errors
+/// As [`extract`].
+pub fn extract_octree(
+    octree: &SignedOctree,
+    frame: &Frame,
+    options: &ExtractOptions,
+    sink: &mut (dyn MeshSink + Send),
+    progress: &dyn Progress,
+) -> Result<MeshSizes> {
+    let bricks = Bricks::new(octree);
+    let (level, placement) = (Level::above(0.0), Bricks::placement(frame));
+    let options = ExtractOptions { level, placement, ..*options };
+    options.check()?;
+    let lattice = Lattice::new(&bricks, level, placement, false);
+    let slices = run::walk(&bricks, progress)?;
+    contour(&lattice, &slices, &options, sink, progress)
 }

@@ -144,6 +144,17 @@ impl Planes {
         self.mass_point().clamp(LOW, HIGH)
     }
 
+    /// Whether the triangles of the polygon's fan round a place have an area: a height of two steps of vertices in cells. In the cell they
+    /// always have.
+    pub(super) fn has_fan(&self, apex: Vec3A) -> bool {
+        let n = self.list.len();
+        (0..n).all(|i| {
+            let (a, b) = (self.list[i].0 - apex, self.list[(i + 1) % n].0 - apex);
+            let longest = a.length().max(b.length()).max((b - a).length());
+            a.cross(b).length() > longest / 8192.0
+        })
+    }
+
     /// Square of the length of the mean unit normal: 1 on a flat piece, 1/2 at a crease of 90 degrees.
     fn flatness(&self) -> f32 {
         let mean = self.units.iter().sum::<Vec3A>() / self.units.len() as f32;
@@ -185,6 +196,11 @@ pub(super) fn within_reach(sum: &Qef, free: Vec3A, is_creased: bool) -> Vec3A {
         // Up to four cells may look for the same point: each stays a little apart.
         return free.lerp(sum.mass_point(), APART);
     }
+    within_cell(sum)
+}
+
+/// The best place in the cell.
+pub(super) fn within_cell(sum: &Qef) -> Vec3A {
     let inside = sum.minimiser_within(LOW, HIGH);
     if inside.is_finite() { inside } else { sum.mass_point().clamp(LOW, HIGH) }
 }

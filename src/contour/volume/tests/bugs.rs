@@ -1,7 +1,7 @@
 //! What other extractors were found to do wrong, and must not happen here.
 
 use super::*;
-use crate::volume::{Cropped, Samples};
+use crate::volume::Cropped;
 
 fn extracted(volume: &impl Volume, options: &ExtractOptions) -> Mesh {
     let mut mesh = Mesh::default();
@@ -136,7 +136,7 @@ fn thin_wedges_keep_their_edge() {
     let (sin, cos) = 10f64.to_radians().sin_cos();
     let wedge = move |p: DVec3| {
         let p = tilt * (p - 14.2);
-        (cos * p.z.abs() * -1.0 + sin * (9.0 - p.x)).min(p.x + 6.0).min(6.0 - p.y.abs())
+        (sin * (9.0 - p.x) - cos * p.z.abs()).min(p.x + 6.0).min(6.0 - p.y.abs())
     };
     for method in [Method::DualContouring, Method::ExtendedMarchingCubes] {
         let mesh = cells(30, wedge, method);

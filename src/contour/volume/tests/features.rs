@@ -52,7 +52,7 @@ fn turn() -> DMat3 {
 fn fandisk(p: DVec3) -> f64 {
     let p = turn() * (p - 16.0);
     let (sin, cos) = 40f64.to_radians().sin_cos();
-    let block = ((p.x * sin - p.y * cos) + 4.0).min(p.y + 7.0).min(9.0 - p.x).min(p.x + 9.0).min(8.0 - p.z.abs());
+    let block = (p.x * sin - p.y * cos + 4.0).min(p.y + 7.0).min(9.0 - p.x).min(p.x + 9.0).min(8.0 - p.z.abs());
     block.min((p.truncate() - DVec2::new(2.0, -7.0)).length() - 5.0)
 }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::mesh::Mesh;
 use crate::mesh::chance::Chance;
 use crate::progress::Silent;
-use crate::volume::{Dense, LevelSet};
+use crate::volume::{Dense, LevelSet, Samples};
 use glam::{DMat3, DVec3};
 
 /// Kinds of random samples.
@@ -197,4 +197,40 @@ fn bad_settings_are_refused() {
             assert_eq!(mesh.faces.is_empty(), border == Border::Open || values.is_empty(), "{size:?} {method:?}");
         }
     }
+}
+
+/// Three materials that meet in a line, and a fourth round them: each triangle between two of them is a triangle of both.
+#[test]
+fn surfaces_of_labels_fit_together() {
+    let size = [24, 22, 20];
+    let labels = Samples::new(size, |[x, y, z]| {
+        let p = DVec3::new(x as f64 - 11.2, y as f64 - 10.4, z as f64 - 9.7);
+        if p.length() > 8.6 { 0.0 } else { 1.0 + ((p.y.atan2(p.x) + 4.0) / 2.1).floor().min(2.0) }
+    });
+    let mut sides = std::collections::BTreeMap::new();
+    let mut volume = 0.0;
+    for label in [0.0, 1.0, 2.0, 3.0] {
+        let mut mesh = Mesh::default();
+        extract_label(&labels, label, &ExtractOptions::default(), &mut mesh, &Silent).unwrap();
+        assert_eq!((mesh.validate(), mesh.report().zero_area_faces), (Ok(()), 0), "label {label}");
+        volume += mesh.report().volume;
+        for face in mesh.faces.iter() {
+            let mut corners: Vec<_> =
+                face.iter().map(|&i| mesh.points[i as usize].to_array().map(f64::to_bits)).collect();
+            corners.sort_unstable();
+            *sides.entry(corners).or_insert(0) += 1;
+        }
+    }
+    // Together they fill the volume, but for its own edges and corners, which nets cut off.
+    let whole: usize = size.iter().product();
+    assert!(volume < whole as f64 && volume > 0.99 * whole as f64, "{volume} of {whole}");
+    let (inner, outer) = (sides.values().filter(|&&n| n == 2).count(), sides.values().filter(|&&n| n == 1).count());
+    assert_eq!(inner + outer, sides.len());
+    assert!(inner > 1500, "{inner}");
+    // Those of one material only are on the border.
+    let on_border = |corner: &[u64; 3]| {
+        let p = corner.map(f64::from_bits);
+        (0..3).any(|a| p[a] < 0.0 || p[a] > size[a] as f64 - 1.0)
+    };
+    assert!(sides.iter().filter(|(_, n)| **n == 1).all(|(corners, _)| corners.iter().all(on_border)));
 }
