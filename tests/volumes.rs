@@ -12,7 +12,7 @@ use zmend::io::volume::{VolumeOptions, read_volume, write_volume};
 use zmend::mesh::sample;
 use zmend::progress::Silent;
 use zmend::topology::{Betti, Options as Repair};
-use zmend::volume::{Cropped, Image, Level, Placement, Volume, Voxels};
+use zmend::volume::{Cropped, Image, Level, Placement, Voxels};
 use zmend::{Mesh, Offset, Options, Solid, Surface, repair};
 
 /// The directory of real volumes beside the repository, if it is there.
