@@ -40,7 +40,7 @@ use crate::error::{Error, Place, Result};
 use crate::progress::Progress;
 use crate::volume::Image;
 use fields::LONGEST;
-use layout::{Source, most_unpacked};
+use layout::Source;
 use std::fmt;
 use std::fs::File;
 use std::io::Read;
@@ -258,7 +258,8 @@ fn read_packed(
     let mut head = Vec::new();
     let unpacked = (&mut rest).take(LONGEST as u64).read_to_end(&mut head);
     unpacked.map_err(|e| samples::Failure::Io(e).into_error(name))?;
-    let source = Source { name, folder, head: &head, rest: &mut rest, len: most_unpacked(len), is_packed: true };
+    let source =
+        Source { name, folder, head: &head, rest: &mut rest, len: layout::most_unpacked(len), is_packed: true };
     read_plain(source, len, options, progress)
 }
 
