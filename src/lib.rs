@@ -52,7 +52,7 @@
 //! | module | what it does |
 //! |---|---|
 //! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
-//! | [`mesh`] | [`Mesh`], reports and validation, self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
+//! | [`mesh`] | [`Mesh`], reports and validation, neighbourhoods ([`Topology`](mesh::Topology)), features, local repairs ([`Mesh::heal`]), editing ([`Edit`](mesh::Edit)), self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
 //! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF; [volumes](io::volume): `MetaImage`, NRRD, `NIfTI`, VTI, VTK, SLC |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |

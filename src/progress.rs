@@ -21,6 +21,8 @@ pub enum Stage {
     Write,
     /// Measuring distances between two surfaces; unit: points.
     Measure,
+    /// Local repairs; unit: steps.
+    Heal,
 }
 
 impl Stage {
@@ -35,6 +37,7 @@ impl Stage {
             Stage::Contour => "contour",
             Stage::Write => "write",
             Stage::Measure => "measure",
+            Stage::Heal => "heal",
         }
     }
 }

@@ -34,6 +34,31 @@ pub struct Line {
     pub colour: Colour,
 }
 
+/// Lines from point to point to point.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Polylines {
+    /// Positions in model units.
+    pub points: Vec<DVec3>,
+    /// The points of each line in order, the first one again at the end if it is closed; and how it is shown.
+    pub lines: Vec<(Vec<u32>, Colour)>,
+}
+
+impl Polylines {
+    /// Drops the points that no line uses; the others keep their order. Points that do not exist stay named.
+    pub fn drop_unused_points(&mut self) {
+        let mut numbers = vec![u32::MAX; self.points.len()];
+        let mut used: Vec<u32> = self.lines.iter().flat_map(|line| line.0.iter().copied()).collect();
+        used.sort_unstable();
+        used.dedup();
+        used.retain(|&v| (v as usize) < numbers.len());
+        (0..).zip(&used).for_each(|(i, &v)| numbers[v as usize] = i);
+        self.points = used.iter().map(|&v| self.points[v as usize]).collect();
+        for v in self.lines.iter_mut().flat_map(|line| &mut line.0) {
+            *v = numbers.get(*v as usize).copied().unwrap_or(u32::MAX);
+        }
+    }
+}
+
 /// Quadrilaterals between points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Patches {
@@ -82,6 +107,28 @@ pub fn write_lines(path: impl AsRef<Path>, lines: &Lines) -> Result<u64> {
             text.put(format!("# weight {}\n", line.weight).as_bytes())?;
         }
         text.put(format!("l {} {}\n", line.ends[0] + 1, line.ends[1] + 1).as_bytes())?;
+    }
+    text.finish()
+}
+
+/// Writes lines as PLY, where each piece is an edge of weight 1, or as OBJ, where each line is one. Returns the size of the file in bytes.
+///
+/// # Errors
+/// When the name says neither, a line refers to a point that does not exist, or the file cannot be written.
+pub fn write_polylines(path: impl AsRef<Path>, lines: &Polylines) -> Result<u64> {
+    let path = path.as_ref();
+    if is_ply(path)? {
+        let piece = |pair: &[u32], colour| Line { ends: [pair[0], pair[1]], weight: 1.0, colour };
+        let pieces = lines.lines.iter().flat_map(|(line, colour)| line.windows(2).map(|pair| piece(pair, *colour)));
+        return write_lines(path, &Lines { points: lines.points.clone(), lines: pieces.collect() });
+    }
+    check_corners(path, "line", lines.points.len(), lines.lines.iter().map(|line| &line.0[..]))?;
+    let mut text = Text::create(path)?;
+    text.obj_points(&lines.points)?;
+    for (line, _) in &lines.lines {
+        text.put(b"l")?;
+        line.iter().try_for_each(|v| text.put(format!(" {}", v + 1).as_bytes()))?;
+        text.put(b"\n")?;
     }
     text.finish()
 }
@@ -229,6 +276,20 @@ mod tests {
 
         let text = String::from_utf8(written("a.obj", |path| write_lines(path, &lines))).expect("text");
         assert_eq!(text, "# zmend\nv 1 0 0\nv 0 1 0\nv 0 0 1\n# weight 2.5\nl 1 2\nl 3 2\n");
+    }
+
+    #[test]
+    fn polylines_are_one_line_each() {
+        let mut lines = Polylines {
+            points: vec![DVec3::ONE, DVec3::X, DVec3::ONE, DVec3::Y, DVec3::Z],
+            lines: vec![(vec![1, 3, 4, 1], [9; 3]), (vec![4, 3], [0; 3])],
+        };
+        lines.drop_unused_points();
+        let text = String::from_utf8(written("a.obj", |path| write_polylines(path, &lines))).expect("text");
+        assert_eq!(text, "# zmend\nv 1 0 0\nv 0 1 0\nv 0 0 1\nl 1 2 3 1\nl 3 2\n");
+        let bytes = written("a.ply", |path| write_polylines(path, &lines));
+        assert!(String::from_utf8_lossy(&bytes).contains("element edge 4\n"));
+        assert_eq!(&bytes[bytes.len() - 3..], [0; 3]);
     }
 
     #[test]

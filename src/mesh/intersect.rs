@@ -4,10 +4,14 @@
 //! their children, down to pairs of leaves; there the boxes of single triangles are compared, and [`meet`] decides
 //! exactly. Pairs of nodes some levels below the root are independent pieces of work for all threads.
 //!
-//! Cost: O(n log n) for surfaces without very long triangles, the number of overlapping boxes for others: quadratic at
-//! worst. Beside the tree, eight bytes a pair found.
+//! Nodes whose boxes are nearly empty, which is what bundles of long thin triangles have, are told apart by boxes that lie along them
+//! ([`Slivers`]).
+//!
+//! Cost: O(n log n), but for triangles that are long in several directions where many others are, and for fans: the triangles around
+//! one point all have boxes that hold it, so a fan of n triangles takes n²/8 comparisons. Beside the tree, eight bytes a pair found.
 
 use super::meet::{Triangle, meet};
+use super::oriented::Slivers;
 use super::tree::{TriangleTree, around};
 use super::{Bounds, Mesh};
 use rayon::prelude::*;
@@ -52,15 +56,21 @@ impl Mesh {
     /// [`self_intersections`](Self::self_intersections), or none if more than `limit` pairs of triangles meet. These
     /// are as many as the pairs of faces if all faces are triangles. Stops as soon as it is known.
     pub fn self_intersections_up_to(&self, limit: usize) -> Option<Vec<[u32; 2]>> {
+        self.intersections_from(0, limit)
+    }
+
+    /// [`self_intersections_up_to`](Self::self_intersections_up_to), but only pairs of which one is face `from` or a later one.
+    pub(super) fn intersections_from(&self, from: u32, limit: usize) -> Option<Vec<[u32; 2]>> {
         let tree = TriangleTree::new(self);
+        let slivers = Slivers::new(&tree);
         let mut pieces = Vec::new();
-        descend(&tree, tree.height().min(PIECES), 1, 1, &mut |a, b| pieces.push([a, b]));
+        descend(&tree, &slivers, tree.height().min(PIECES), 1, 1, &mut |a, b| pieces.push([a, b]));
         let found = AtomicUsize::new(0);
         let in_piece = |&[a, b]: &[u32; 2]| {
             let mut join =
-                Join { tree: &tree, limit, found: &found, pairs: Vec::new(), near: [Vec::new(), Vec::new()] };
+                Join { tree: &tree, from, limit, found: &found, pairs: Vec::new(), near: [Vec::new(), Vec::new()] };
             if !join.is_over() {
-                descend(&tree, tree.height(), a, b, &mut |a, b| join.leaves(a, b));
+                descend(&tree, &slivers, tree.height(), a, b, &mut |a, b| join.leaves(a, b));
             }
             join.pairs
         };
@@ -76,7 +86,14 @@ impl Mesh {
 }
 
 /// Calls `visit` with every pair of nodes on a level, below two nodes of the same level, whose boxes overlap.
-fn descend(tree: &TriangleTree<'_>, level: u32, a: u32, b: u32, visit: &mut impl FnMut(u32, u32)) {
+pub(super) fn descend(
+    tree: &TriangleTree<'_>,
+    slivers: &Slivers,
+    level: u32,
+    a: u32,
+    b: u32,
+    visit: &mut impl FnMut(u32, u32),
+) {
     if a >> level != 0 {
         return visit(a, b);
     }
@@ -84,8 +101,8 @@ fn descend(tree: &TriangleTree<'_>, level: u32, a: u32, b: u32, visit: &mut impl
     let children: &[(u32, u32)] = if a == b { &[(0, 0), (0, 1), (1, 1)] } else { &[(0, 0), (0, 1), (1, 0), (1, 1)] };
     for (i, j) in children {
         let (a, b) = (2 * a + i, 2 * b + j);
-        if a == b || overlap(tree.bounds(a), tree.bounds(b)) {
-            descend(tree, level, a, b, visit);
+        if a == b || (overlap(tree.bounds(a), tree.bounds(b)) && !slivers.are_apart(tree, a, b)) {
+            descend(tree, slivers, level, a, b, visit);
         }
     }
 }
@@ -104,6 +121,8 @@ struct Near {
 /// The join of two subtrees.
 struct Join<'a> {
     tree: &'a TriangleTree<'a>,
+    /// Pairs of earlier faces are of no interest.
+    from: u32,
     limit: usize,
     /// Pairs that were found by all.
     found: &'a AtomicUsize,
@@ -148,8 +167,8 @@ impl Join<'_> {
     }
 
     fn pair(&mut self, t: &Near, u: &Near) {
-        if overlap(&t.bounds, &u.bounds) && meet(&t.triangle, &u.triangle) {
-            let (f, g) = (self.tree.face(t.number), self.tree.face(u.number));
+        let (f, g) = (self.tree.face(t.number), self.tree.face(u.number));
+        if f.max(g) >= self.from && overlap(&t.bounds, &u.bounds) && meet(&t.triangle, &u.triangle) {
             self.pairs.push([f.min(g), f.max(g)]);
             self.found.fetch_add(1, Relaxed);
         }

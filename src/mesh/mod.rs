@@ -1,9 +1,15 @@
-//! Indexed polygons, and what can be said about them.
+//! Indexed polygons: what can be said about them, and what can be done to them.
 
 pub(crate) mod chance;
+mod corners;
 mod distance;
+mod edit;
+mod features;
+mod gaps;
+mod heal;
 mod intersect;
 mod meet;
+mod oriented;
 mod polygon;
 mod report;
 pub mod sample;
@@ -11,18 +17,27 @@ mod source;
 mod star;
 mod stream;
 mod tally;
+mod topology;
 mod tree;
 mod validate;
 
 pub use distance::{Deviation, DistanceOptions, Distances};
+pub use edit::{Edit, FaceId, PointId, SavePoint};
+pub use features::{Chain, Constraint, Constraints, FeatureOptions, Features, Group, Groups, chains, grow};
+pub use gaps::Gap;
+pub use heal::{Defects, HealOptions, HealStep, Healed};
 pub use polygon::triangulate;
 pub use report::Report;
 pub(crate) use source::Batch;
 pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
+pub use topology::{
+    BoundaryLoop, Diagnosis, EdgeKey, FaceState, Geodesics, MeshKind, Neighbour, Orientation, Search, Topology,
+};
 pub use tree::{Closest, TriangleTree};
 pub use validate::Violation;
 
 use glam::DVec3;
+use std::ops::Range;
 
 /// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
 /// [`report`](Mesh::report) tells which.
@@ -91,8 +106,16 @@ impl Polygons {
     /// # Panics
     /// When there is no polygon `i`.
     pub fn get(&self, i: usize) -> &[u32] {
+        &self.corners[self.range(i)]
+    }
+
+    /// Where the corners of polygon `i` are among [`corners`](Self::corners).
+    ///
+    /// # Panics
+    /// When there is no polygon `i`.
+    pub fn range(&self, i: usize) -> Range<usize> {
         let start = if i == 0 { 0 } else { self.ends[i - 1] as usize };
-        &self.corners[start..self.ends[i] as usize]
+        start..self.ends[i] as usize
     }
 
     /// All polygons in order.

@@ -91,7 +91,7 @@ impl Mesh {
     /// face that runs along an edge and straight back uses it twice. A *fan* is a set of corners at one point that hang
     /// together by edges. Lengths, areas and volumes leave out what has points that are not finite.
     ///
-    /// About 15 bytes and 60 ns a corner on one thread, 35 ns on two.
+    /// About 7 bytes a corner, 11 where faces differ in their numbers of corners; 60 ns on one thread, 35 ns on two.
     /// The result does not depend on the number of threads.
     ///
     /// ```
@@ -141,7 +141,7 @@ impl Mesh {
 
 #[cfg(test)]
 mod tests {
-    use super::super::star::Stars;
+    use super::super::corners::Corners;
     use super::*;
     use glam::DVec3;
     use proptest::prelude::*;
@@ -360,7 +360,7 @@ mod tests {
                 pool.install(work);
                 println!("{threads} threads, {what}: {:.1} ns a corner", 1e9 * start.elapsed().as_secs_f64() / corners);
             };
-            time("stars", &|| assert_eq!(Stars::new(&mesh).len(), mesh.points.len()));
+            time("corners", &|| assert_eq!(Corners::new(&mesh).points(), mesh.points.len()));
             time("report", &|| assert!(mesh.report().is_closed()));
             time("validate", &|| mesh.validate().unwrap());
         }

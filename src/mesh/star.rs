@@ -1,6 +1,6 @@
 //! The corners of all faces at each point: enough to see every edge and every fan, without a table of edges.
 
-use super::Mesh;
+use super::corners::Corners;
 
 /// A corner of a face, seen from its point.
 #[derive(Debug, Clone, Copy, Default)]
@@ -13,58 +13,13 @@ pub(super) struct Corner {
     pub(super) face: u32,
 }
 
-/// The corners of all sound faces, sorted by point, in order of faces at each point. 12 bytes a corner, 4 a point.
-pub(super) struct Stars {
-    /// Where each point's corners end.
-    ends: Vec<u32>,
-    corners: Vec<Corner>,
-}
-
-impl Stars {
-    /// Sorts by counting: two passes over the faces.
-    pub(super) fn new(mesh: &Mesh) -> Self {
-        let sound = || (0u32..).zip(mesh.faces.iter()).filter(|(_, face)| mesh.is_sound(face));
-        let mut ends = vec![0u32; mesh.points.len()];
-        sound().flat_map(|(_, face)| face).for_each(|&v| ends[v as usize] += 1);
-        let mut total = 0;
-        for end in &mut ends {
-            // For now where the point's corners start; filling moves it to where they end.
-            total += std::mem::replace(end, total);
-        }
-        let mut corners = vec![Corner::default(); total as usize];
-        for (face, cycle) in sound() {
-            let mut prev = cycle[cycle.len() - 1];
-            for (k, &v) in cycle.iter().enumerate() {
-                let next = cycle[if k + 1 == cycle.len() { 0 } else { k + 1 }];
-                let end = &mut ends[v as usize];
-                corners[*end as usize] = Corner { prev, next, face };
-                *end += 1;
-                prev = v;
-            }
-        }
-        Stars { ends, corners }
-    }
-
-    /// Number of points, used or not.
-    pub(super) fn len(&self) -> usize {
-        self.ends.len()
-    }
-
-    /// The corners at a point.
-    pub(super) fn at(&self, point: u32) -> &[Corner] {
-        let v = point as usize;
-        let start = if v == 0 { 0 } else { self.ends[v - 1] };
-        &self.corners[start as usize..self.ends[v] as usize]
-    }
-}
-
 /// One point's corners and the edges there. Made once and moved from point to point.
 #[derive(Default)]
-pub(super) struct Star<'a> {
+pub(super) struct Star {
     /// The point.
     pub(super) point: u32,
     /// The corners there.
-    pub(super) corners: &'a [Corner],
+    pub(super) corners: Vec<Corner>,
     /// Each side of a corner: the point at its other end in the upper half; then the corner's number, and 1 in the lowest
     /// bit if the side leaves the point. Sorted, so that the users of an edge are neighbours.
     sides: Vec<u64>,
@@ -72,10 +27,16 @@ pub(super) struct Star<'a> {
     links: Vec<u32>,
 }
 
-impl<'a> Star<'a> {
+impl Star {
     /// Moves to another point. Sides that lead from a point to itself are left out.
-    pub(super) fn visit(&mut self, stars: &'a Stars, point: u32) {
-        (self.point, self.corners) = (point, stars.at(point));
+    pub(super) fn visit(&mut self, corners: &Corners<'_>, point: u32) {
+        self.point = point;
+        self.corners.clear();
+        self.corners.extend(corners.at(point).iter().map(|&corner| Corner {
+            prev: corners.point(corners.prev(corner)),
+            next: corners.point(corners.next(corner)),
+            face: corners.face(corner),
+        }));
         self.sides.clear();
         for (corner, i) in self.corners.iter().zip(0u64..) {
             let side = |other: u32, leaves: u64| (u64::from(other) << 32) | (i << 1) | leaves;
@@ -87,7 +48,7 @@ impl<'a> Star<'a> {
 
     /// The edges at the point, by the index of their other end.
     pub(super) fn edges(&self) -> impl Iterator<Item = Edge<'_>> {
-        self.sides.chunk_by(|a, b| a >> 32 == b >> 32).map(|sides| Edge { sides, corners: self.corners })
+        self.sides.chunk_by(|a, b| a >> 32 == b >> 32).map(|sides| Edge { sides, corners: &self.corners })
     }
 
     /// Number of fans. Corners without sides, of faces that stay at their point, are none of their own.
@@ -157,6 +118,7 @@ pub(super) fn repeated(polygon: &[u32]) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Mesh;
     use glam::DVec3;
 
     #[test]
@@ -164,14 +126,14 @@ mod tests {
         // Two triangles share edge 0-1, a third one touches them in point 0, a fourth is not sound.
         let faces: [&[u32]; 4] = [&[0, 1, 2], &[1, 0, 3], &[0, 4, 5], &[0, 9, 1]];
         let mesh = Mesh { points: vec![DVec3::ZERO; 6], faces: faces.into_iter().collect() };
-        let stars = Stars::new(&mesh);
+        let corners = Corners::new(&mesh);
         let mut star = Star::default();
-        star.visit(&stars, 0);
+        star.visit(&corners, 0);
         assert_eq!(star.fans(), 2);
         let edges: Vec<_> = star.edges().map(|e| (e.other(), e.users(), e.outgoing())).collect();
         assert_eq!(edges, [(1, 2, 1), (2, 1, 0), (3, 1, 1), (4, 1, 1), (5, 1, 0)]);
         assert_eq!(star.edges().next().unwrap().faces().collect::<Vec<_>>(), [0, 1]);
-        star.visit(&stars, 1);
+        star.visit(&corners, 1);
         assert_eq!((star.fans(), star.corners.len()), (1, 2));
     }
 
@@ -179,11 +141,11 @@ mod tests {
     fn faces_that_stay_at_a_point_are_no_fans() {
         let faces: [&[u32]; 3] = [&[1, 1, 1], &[0, 0, 0], &[0, 2, 3]];
         let mesh = Mesh { points: vec![DVec3::ZERO; 5], faces: faces.into_iter().collect() };
-        let stars = Stars::new(&mesh);
+        let corners = Corners::new(&mesh);
         let mut star = Star::default();
         let fans: Vec<u32> = (0..5)
             .map(|point| {
-                star.visit(&stars, point);
+                star.visit(&corners, point);
                 star.fans()
             })
             .collect();

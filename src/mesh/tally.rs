@@ -1,6 +1,7 @@
 //! The sums behind a report: over faces, and over points with the edges and faces of which they are the lowest.
 
-use super::star::{Corner, Star, Stars, repeated};
+use super::corners::Corners;
+use super::star::{Corner, Star, repeated};
 use super::{Bounds, Mesh};
 use crate::sets::Sets;
 use glam::DVec3;
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 
 /// A face is flat to zero area when twice its area is at most this part of its longest edge squared: far above the
 /// rounding of doubles near the origin (2e-16), far below the slimmest triangle that single precision can tell (1e-7).
-const FLAT: f64 = 1e-12;
+pub(super) const FLAT: f64 = 1e-12;
 /// Lengths whose sixth powers are in the range of numbers.
 const ORDINARY: std::ops::Range<f64> = 1e-45..1e45;
 /// Points or faces handled at a time. Fixed, so that sums do not depend on the number of threads.
@@ -123,20 +124,20 @@ impl Faces {
 
 /// Adds up what is seen from all points.
 pub(super) fn sum_points(mesh: &Mesh) -> Tally {
-    let stars = Stars::new(mesh);
+    let corners = Corners::new(mesh);
     let (surface, rim) = (Sets::new(mesh.faces.len()), Sets::new(mesh.points.len()));
     let in_chunk = |chunk: usize| {
         let mut sums = Tally::default();
         let mut star = Star::default();
-        for v in chunk * CHUNK..stars.len().min((chunk + 1) * CHUNK) {
-            star.visit(&stars, v as u32);
+        for v in chunk * CHUNK..corners.points().min((chunk + 1) * CHUNK) {
+            star.visit(&corners, v as u32);
             if !star.corners.is_empty() {
                 sums.add_star(mesh, &mut star, &surface, &rim);
             }
         }
         sums
     };
-    let chunks: Vec<Tally> = (0..stars.len().div_ceil(CHUNK)).into_par_iter().map(in_chunk).collect();
+    let chunks: Vec<Tally> = (0..corners.points().div_ceil(CHUNK)).into_par_iter().map(in_chunk).collect();
     chunks.into_iter().fold(Tally::default(), |a, b| Tally {
         used: a.used + b.used,
         fans: a.fans + b.fans,
@@ -179,7 +180,7 @@ impl Default for Tally {
 }
 
 impl Tally {
-    fn add_star(&mut self, mesh: &Mesh, star: &mut Star<'_>, surface: &Sets, rim: &Sets) {
+    fn add_star(&mut self, mesh: &Mesh, star: &mut Star, surface: &Sets, rim: &Sets) {
         let v = star.point;
         let at = mesh.points[v as usize];
         self.used += 1;
@@ -207,18 +208,18 @@ impl Tally {
                 self.max_length = self.max_length.max(length);
             }
         }
-        self.duplicate_faces += duplicates(mesh, star);
+        self.duplicate_faces += copies(mesh, star).len() as u64;
     }
 }
 
-/// Number of faces beyond the first over the same cycle, among those whose lowest point is the star's.
-fn duplicates(mesh: &Mesh, star: &Star<'_>) -> u64 {
+/// Faces beyond the first over the same cycle, among those whose lowest point is the star's.
+pub(super) fn copies(mesh: &Mesh, star: &Star) -> Vec<u32> {
     let v = star.point;
     let ends = |corner: &Corner| [corner.prev.min(corner.next), corner.prev.max(corner.next)];
     let is_lowest = |corner: &&Corner| ends(corner)[0] > v && corner.prev != corner.next;
     let mut lowest: Vec<Corner> = star.corners.iter().filter(is_lowest).copied().collect();
-    lowest.sort_unstable_by_key(ends);
-    // The cycle from the star's point on, towards the lower neighbour.
+    lowest.sort_unstable_by_key(|corner| (ends(corner), corner.face));
+    // The cycle from the star's point on, towards the lower neighbour, and its face.
     let cycle = |corner: &Corner| {
         let face = mesh.faces.get(corner.face as usize);
         if repeated(face).is_some() || face.iter().any(|&i| i < v) {
@@ -229,12 +230,12 @@ fn duplicates(mesh: &Mesh, star: &Star<'_>) -> u64 {
         if corner.prev < corner.next {
             cycle[1..].reverse();
         }
-        Some(cycle)
+        Some((cycle, corner.face))
     };
-    let copies = |alike: &[Corner]| {
-        let mut cycles: Vec<Vec<u32>> = alike.iter().filter_map(cycle).collect();
+    let among = |alike: &[Corner]| {
+        let mut cycles: Vec<(Vec<u32>, u32)> = alike.iter().filter_map(cycle).collect();
         cycles.sort_unstable();
-        cycles.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64
+        cycles.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect::<Vec<_>>()
     };
-    lowest.chunk_by(|a, b| ends(a) == ends(b)).filter(|alike| alike.len() > 1).map(copies).sum()
+    lowest.chunk_by(|a, b| ends(a) == ends(b)).filter(|alike| alike.len() > 1).flat_map(among).collect()
 }

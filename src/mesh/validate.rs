@@ -1,6 +1,7 @@
 //! Is this the surface of a solid? If not, why?
 
-use super::star::{Star, Stars, repeated};
+use super::corners::Corners;
+use super::star::{Star, repeated};
 use super::tally::{CHUNK, sum_faces};
 use super::{Bounds, Mesh};
 use rayon::prelude::*;
@@ -97,16 +98,16 @@ impl Mesh {
         if let Some(violation) = (0..self.faces.len()).into_par_iter().find_map_first(in_face) {
             return Err(violation);
         }
-        let stars = Stars::new(self);
+        let corners = Corners::new(self);
         let in_chunk = |chunk: usize| {
             let mut star = Star::default();
-            let points = chunk * CHUNK..stars.len().min((chunk + 1) * CHUNK);
+            let points = chunk * CHUNK..corners.points().min((chunk + 1) * CHUNK);
             points.into_iter().find_map(|v| {
-                star.visit(&stars, v as u32);
+                star.visit(&corners, v as u32);
                 star_violation(&mut star)
             })
         };
-        (0..stars.len().div_ceil(CHUNK)).into_par_iter().find_map_first(in_chunk).map_or(Ok(()), Err)
+        (0..corners.points().div_ceil(CHUNK)).into_par_iter().find_map_first(in_chunk).map_or(Ok(()), Err)
     }
 
     /// Whether the total signed volume is not negative. A solid with cavities is outward although the cavities' own
@@ -132,7 +133,7 @@ impl Mesh {
 }
 
 /// What is wrong with the edges to higher points, or else with the point itself.
-fn star_violation(star: &mut Star<'_>) -> Option<Violation> {
+fn star_violation(star: &mut Star) -> Option<Violation> {
     let point = star.point;
     let wrong_edge = star.edges().filter(|edge| edge.other() > point).find_map(|edge| {
         let ends = [point, edge.other()];

@@ -157,6 +157,53 @@ fn add_patches(mesh: &Mesh, points: &[DVec3], faces: std::ops::Range<usize>, pat
     }
 }
 
+/// An edge to be marked.
+pub(super) struct Mark {
+    pub(super) ends: [u32; 2],
+    pub(super) light: Vec3,
+}
+
+/// Edges and faces to be marked.
+#[derive(Default)]
+pub(super) struct Marks {
+    pub(super) edges: Vec<Mark>,
+    pub(super) faces: Vec<u32>,
+    /// The colour of the faces.
+    pub(super) light: Vec3,
+}
+
+/// Marks are seen as if they were this much nearer, in samples; edges in front of faces.
+const MARK_SHIFT: [f64; 2] = [0.5, 4.0];
+
+/// Strips along the marked edges, `width` samples wide, and the marked faces in another colour.
+fn mark_patches(mesh: &Mesh, points: &[DVec3], marks: &Marks, width: f64) -> Vec<Patch> {
+    let point = |i: u32| points.get(i as usize).copied().unwrap_or(DVec3::NAN);
+    let mut patches = Vec::new();
+    let mut triangles = Vec::new();
+    for &face in &marks.faces {
+        triangles.clear();
+        triangulate(points, mesh.faces.get(face as usize), &mut triangles);
+        for t in &triangles {
+            let corners = t.map(|i| point(i) + MARK_SHIFT[0] * DVec3::Z);
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(DVec3::Z).as_vec3();
+            let light = shade(if normal.z < 0.0 { -normal } else { normal }, marks.light);
+            patches.extend(Patch::new(corners, 0).map(|patch| Patch { light, ..patch }));
+        }
+    }
+    for mark in &marks.edges {
+        let [a, b] = mark.ends.map(|i| point(i) + MARK_SHIFT[1] * DVec3::Z);
+        let along = (b - a).truncate().normalize_or(glam::DVec2::X);
+        // A little longer than the edge, so that marks one after another have no gaps.
+        let (across, ahead) = (0.5 * width * along.perp().extend(0.0), 0.25 * width * along.extend(0.0));
+        let (a, b) = (a - ahead, b + ahead);
+        let quad = [a - across, b - across, b + across, a + across];
+        for corners in [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]] {
+            patches.extend(Patch::new(corners, 0).map(|patch| Patch { light: mark.light, ..patch }));
+        }
+    }
+    patches
+}
+
 /// One sample: the light that arrives, and how near to the eye it comes from (minus infinity: nothing there).
 #[derive(Clone, Copy)]
 struct Sample {
@@ -185,6 +232,15 @@ impl Canvas {
             patches
         };
         let patches: Vec<Vec<Patch>> = (0..mesh.faces.len().div_ceil(FACES)).into_par_iter().map(chunk).collect();
+        self.fill(&patches, wire);
+    }
+
+    /// Marks edges, in strips `width` samples wide, and faces of a mesh over placed points.
+    pub(super) fn mark(&mut self, mesh: &Mesh, points: &[DVec3], marks: &Marks, width: f64) {
+        self.fill(&[mark_patches(mesh, points, marks, width)], None);
+    }
+
+    fn fill(&mut self, patches: &[Vec<Patch>], wire: Option<f32>) {
         let rows = self.height.div_ceil(2 * rayon::current_num_threads());
         let width = self.width;
         self.samples.par_chunks_mut((rows * width).max(1)).enumerate().for_each(|(band, samples)| {

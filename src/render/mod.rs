@@ -7,6 +7,7 @@
 //! mean depth around (Luft, Colditz and Deussen 2006, "Image enhancement by unsharp masking the depth buffer").
 
 mod canvas;
+mod defects;
 
 use crate::error::{Error, Result};
 use crate::mesh::{Bounds, Mesh};
@@ -30,6 +31,9 @@ pub struct View {
     pub supersample: u32,
     /// Draw the edges of polygons on top.
     pub wireframe: bool,
+    /// Mark what is wrong: boundary edges green, non-manifold edges violet, edges whose faces run the same way blue, faces that meet others
+    /// where they should not yellow (unless a million pairs do).
+    pub defects: bool,
     /// Free border around the mesh, as part of the shorter side of its panel.
     pub margin: f64,
 }
@@ -43,6 +47,7 @@ impl Default for View {
             elevation: 25.0,
             supersample: 2,
             wireframe: false,
+            defects: false,
             margin: 0.05,
         }
     }
@@ -132,6 +137,9 @@ pub fn render(meshes: &[&Mesh], view: &View) -> Image {
                 let placed: Vec<DVec3> = flat[i as usize].par_iter().map(|&p| (p - center) * scale + middle).collect();
                 canvas.draw(mesh, &placed, view.wireframe.then_some(WIRE_WIDTH * fine as f32));
                 canvas.darken_creases();
+                if view.defects {
+                    canvas.mark(mesh, &placed, &defects::marks(mesh), MARK_WIDTH * f64::from(fine));
+                }
             }
             canvas.shrink(fine as usize)
         })
@@ -164,6 +172,9 @@ fn frames(meshes: &[&Mesh], flat: &[Vec<DVec3>]) -> Vec<Bounds> {
 
 /// Half the width of an edge in pixels; its two faces draw a half each.
 const WIRE_WIDTH: f32 = 0.4;
+
+/// The width of a marked edge in pixels.
+const MARK_WIDTH: f64 = 3.0;
 
 /// Looks at the scene in parallel rays.
 struct Camera {
@@ -239,6 +250,27 @@ mod tests {
         assert_eq!(covered(&image).1, 0);
         let behind = render(&[&mesh], &View { azimuth: 180.0, elevation: 0.0, ..small() });
         assert!(behind.pixel(300, 250)[0] > 100 && covered(&behind).1 > 10_000);
+    }
+
+    #[test]
+    fn defects_are_marked_in_their_colours() {
+        // How many pixels are more green, more violet, or more yellow than any surface is.
+        let marked = |name: &str| {
+            let mesh = sample::build(name, 1).unwrap();
+            let image = render(&[&mesh], &View { defects: true, ..small() });
+            let pixels = image.rgb.as_chunks::<3>().0;
+            let count = |test: fn([i32; 3]) -> bool| pixels.iter().filter(|p| test(p.map(i32::from))).count();
+            [
+                count(|[r, g, b]| g > r + 40 && g > b + 40),
+                count(|[r, g, b]| r > g + 60 && b > g + 60),
+                count(|[r, g, b]| r > b + 60 && g > b + 60),
+            ]
+        };
+        assert_eq!(marked("torus"), [0; 3]);
+        let [open, doubled, crossing] = ["knot-holes", "doubled", "overlap"].map(marked);
+        // Green over the red behind is a little yellow where they meet.
+        assert!(open[0] > 500 && open[1] == 0 && open[2] < 100, "{open:?}");
+        assert!(doubled[1] > 1000 && crossing[2] > 1000 && crossing[0] == 0, "{doubled:?} {crossing:?}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! `zmend info`: what a mesh is and what is wrong with it.
 
 use crate::args::InfoArgs;
+use crate::details::Details;
 use crate::measure::{self, Measured, Side};
 use crate::print::{self, Table};
 use crate::units::{real, vector};
@@ -28,10 +29,10 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
             continue;
         }
         match look(path, args.quick) {
-            Ok((info, measured)) if args.json => print::out(&as_json(&info, measured))?,
-            Ok((info, measured)) => {
+            Ok((info, measured, details)) if args.json => print::out(&as_json(&info, measured, &details))?,
+            Ok((info, measured, details)) => {
                 let gap = if i > 0 { "\n" } else { "" };
-                print::out(&format!("{gap}{}", as_text(&info, measured)))?;
+                print::out(&format!("{gap}{}", as_text(&info, measured, &details)))?;
             }
             // Other files are no worse for it.
             Err(error) => {
@@ -43,9 +44,9 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     Ok(code)
 }
 
-fn look(path: &Path, quick: bool) -> Result<(InputInfo, Measured)> {
+fn look(path: &Path, quick: bool) -> Result<(InputInfo, Measured, Details)> {
     let file = measure::Loaded::open(path)?;
-    Ok((file.info().clone(), file.measured(quick)))
+    Ok((file.info().clone(), file.measured(quick), Details::of(file.mesh())))
 }
 
 /// What is to be said of a file that is no mesh; `None` of meshes.
@@ -93,11 +94,12 @@ fn look_at_octree(path: &Path, is_json: bool) -> Result<Option<String>> {
     Ok(Some(text))
 }
 
-fn as_json(info: &InputInfo, measured: Measured) -> String {
-    format!("{}\n", json::merged(json::file(info), json::side(&Side::new(info, Some(measured)))))
+fn as_json(info: &InputInfo, measured: Measured, details: &Details) -> String {
+    let side = json::side(&Side::new(info, Some(measured)));
+    format!("{}\n", json::merged(json::merged(json::file(info), side), details.json()))
 }
 
-fn as_text(info: &InputInfo, measured: Measured) -> String {
+fn as_text(info: &InputInfo, measured: Measured, details: &Details) -> String {
     let name = info.path.display();
     let welded = if matches!(info.format, Format::Stl | Format::Gltf | Format::Glb) { ", welded" } else { "" };
     let mut text = format!("{name}: {} ({}){welded}\n", info.format, info.encoding);
@@ -106,7 +108,8 @@ fn as_text(info: &InputInfo, measured: Measured) -> String {
     let report = measured.report.clone();
     let mut table = Table::default();
     Side::new(info, Some(measured)).lines().into_iter().for_each(|(label, value)| table.line(label, &[value]));
-    let _ = write!(text, "{table}");
+    details.lines(&mut table);
+    let _ = write!(text, "{table}{}", details.rims());
     if !report.bounds.is_empty() {
         let (min, max) = (vector(report.bounds.min), vector(report.bounds.max));
         let _ = writeln!(text, "  from {min} to {max}: {}", report.bounds.extent().to_array().map(real).join(" x "));

@@ -3,10 +3,14 @@
 mod args;
 mod bars;
 mod compare;
+mod convert;
+mod details;
 mod digits;
 mod extract;
+mod features;
 mod goal;
 mod handles;
+mod heal;
 mod info;
 mod interrupt;
 mod json;
@@ -53,6 +57,9 @@ fn run(args: &Args) -> Result<ExitCode> {
         Command::Remesh(args) => repair::remesh(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Heal(args) => heal::run(args),
+        Command::Features(args) => features::run(args),
+        Command::Convert(args) => convert::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Render(args) => render::run(args),
     }

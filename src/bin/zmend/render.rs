@@ -24,6 +24,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<ExitCode> {
         azimuth: args.azimuth,
         elevation: args.elevation,
         wireframe: args.wireframe,
+        defects: args.defects,
         ..View::default()
     };
     for (path, _) in inputs.iter().zip(&meshes).filter(|(_, mesh)| mesh.faces.is_empty()) {

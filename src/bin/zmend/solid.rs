@@ -119,7 +119,7 @@ pub(crate) fn open(
         let (loaded, level) = Loaded::open(path, args, bars)?;
         let read = start.elapsed();
         let (solid, told) = loaded.solid(level, work.cell, bars)?;
-        let times = vec![("read", read), (Stage::Sign.name(), start.elapsed() - read)];
+        let times = vec![("read", read), (Stage::Sign.name(), start.elapsed().saturating_sub(read))];
         return Ok((solid, Source::Volume(Box::new(told)), times));
     }
     let mut input = Bounded::open(path)?;

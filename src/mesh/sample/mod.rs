@@ -1,11 +1,13 @@
 //! Solids to try things on, clean ones and broken ones, made from formulas: the same bytes on every machine and run.
 
+pub mod create;
 mod damage;
 mod shape;
 
 use super::Mesh;
 use super::chance::Chance;
 use crate::error::{Error, Result};
+use create::{Platonic, finer, platonic, zonohedron};
 use damage::{Carelessness, careless, without, without_loose_points};
 use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot, IVec3};
 use shape::{arc, band, cells, cylinder, extrude, hole, moved, sphere, together, triangles, tube, wrapped};
@@ -28,6 +30,11 @@ const SAMPLES: &[Sample] = &[
     ("sphere", "a ball; clean", |detail| sphere(24 * detail as i32, |p| p)),
     ("torus", "a torus; clean, genus 1", |detail| torus(96 * detail, 40 * detail)),
     ("cube", "a unit cube of quads, six at detail 1; clean", cube),
+    ("tetrahedron", "four triangles at detail 1; clean", |detail| solid(Platonic::Tetrahedron, detail)),
+    ("octahedron", "eight triangles at detail 1; clean", |detail| solid(Platonic::Octahedron, detail)),
+    ("dodecahedron", "twelve pentagons cut into triangles; clean", |detail| solid(Platonic::Dodecahedron, detail)),
+    ("icosahedron", "twenty triangles at detail 1; clean", |detail| solid(Platonic::Icosahedron, detail)),
+    ("zonohedron", "thirty rhombs cut into triangles; clean", rhombs),
     ("plate", "an open square of two triangles at detail 1", plate),
     ("nested", "a ball in the cavity of a ball; clean, three surfaces", nested),
     ("doubled", "a torus with every face twice, half of the copies flipped", doubled),
@@ -50,7 +57,7 @@ pub fn names() -> &'static [(&'static str, &'static str)] {
 
 /// Makes a sample about one to six model units large.
 ///
-/// Detail 1 means some thousand to twenty thousand triangles (a dozen or so for `cube` and `plate`), and their number
+/// Detail 1 means some thousand to twenty thousand triangles (some dozen for polyhedra and `plate`), and their number
 /// grows with its square; shape and defects stay, where they are not single faces.
 ///
 /// # Errors
@@ -217,6 +224,18 @@ fn cube(detail: u32) -> Mesh {
     cells(IVec3::splat(detail as i32), |_| true, |p| p.as_dvec3() / f64::from(detail))
 }
 
+fn solid(solid: Platonic, detail: u32) -> Mesh {
+    finer(&platonic(solid), detail)
+}
+
+/// The zonohedron of the six axes through the corners of an icosahedron.
+fn rhombs(detail: u32) -> Mesh {
+    let corners = platonic(Platonic::Icosahedron).points;
+    let first = |i: &usize| corners[..*i].iter().all(|p| p.distance(-corners[*i]) > 0.5);
+    let axes: Vec<DVec3> = (0..corners.len()).filter(first).map(|i| 0.5 * corners[i]).collect();
+    finer(&zonohedron(&axes).expect("six axes in space"), detail)
+}
+
 fn plate(detail: u32) -> Mesh {
     without_loose_points(&triangles(&without(&cube(detail), |_, p| p.z > 0.0)))
 }
@@ -269,6 +288,11 @@ mod tests {
             ("sphere", 1, 0),
             ("torus", 1, 1),
             ("cube", 1, 0),
+            ("tetrahedron", 1, 0),
+            ("octahedron", 1, 0),
+            ("dodecahedron", 1, 0),
+            ("icosahedron", 1, 0),
+            ("zonohedron", 1, 0),
             ("nested", 3, 0),
         ] {
             for detail in [1, 2, 3] {

@@ -1,12 +1,14 @@
 //! What can be said on the command line.
 
 mod compare;
+mod local;
 mod repair;
 mod topology;
 mod values;
 mod volume;
 
 pub(crate) use compare::CompareArgs;
+pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
@@ -82,6 +84,9 @@ pub(crate) enum Command {
     Remesh(RemeshArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
+    Heal(HealArgs),
+    Features(FeaturesArgs),
+    Convert(ConvertArgs),
     Sample(SampleArgs),
     Render(RenderArgs),
 }
@@ -140,6 +145,7 @@ pub(crate) struct SampleArgs {
 Examples:
   zmend render broken.ply picture.png
   zmend render broken.ply both.png --compare fixed.ply      side by side at one scale
+  zmend render broken.ply wrong.png --defects               what is wrong, in colour
   zmend render part.stl top.png --elevation 90 --wireframe --size 1600x1200")]
 pub(crate) struct RenderArgs {
     /// Mesh to draw.
@@ -162,6 +168,10 @@ pub(crate) struct RenderArgs {
     /// Draw the edges of faces.
     #[arg(long)]
     pub(crate) wireframe: bool,
+    /// Mark boundary edges green, non-manifold edges violet, edges between faces that run the same way blue, and faces that pass
+    /// through others yellow.
+    #[arg(long)]
+    pub(crate) defects: bool,
     /// Replace OUT.png if it exists.
     #[arg(short, long)]
     pub(crate) force: bool,

@@ -1,0 +1,93 @@
+//! `zmend heal`: local repairs.
+
+use crate::args::{HealArgs, Limit};
+use crate::bars::Bars;
+use crate::print::{self, Table};
+use crate::units::count;
+use crate::{convert, goal};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::process::ExitCode;
+use zmend::mesh::{Defects, HealOptions, Healed};
+use zmend::{Result, io};
+
+pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
+    goal::mesh_format(&args.out)?;
+    goal::check(&args.out, &[&args.input], args.force)?;
+    let bars = Bars::new(!args.json);
+    bars.start("read", 0);
+    let mesh = io::read(&args.input)?;
+    let (tolerance, is_absolute) = match args.tolerance {
+        Limit::Length(length) => (length, true),
+        Limit::Percent(percent) => (percent / 100.0, false),
+    };
+    let options = HealOptions {
+        tolerance,
+        is_absolute,
+        max_hole_edges: args.max_hole,
+        smooth: !args.plain,
+        check_intersections: !args.quick,
+    };
+    let healed = mesh.heal(&options, &bars)?;
+    bars.start("write", 0);
+    let bytes = convert::write(&args.out, &healed.mesh, false)?;
+    drop(bars);
+    if args.json {
+        let told = json!({
+            "path": args.out.display().to_string(),
+            "bytes": bytes,
+            "vertices": healed.mesh.points.len(),
+            "faces": healed.mesh.faces.len(),
+            "before": as_json(&healed.before),
+            "after": as_json(&healed.after),
+            "steps": healed.steps.iter().map(|s| json!({ "name": s.name, "count": s.count, "undone": s.is_undone }))
+                .collect::<Vec<_>>(),
+        });
+        print::out(&format!("{told}\n"))?;
+    } else {
+        let written = convert::told(&args.out, &healed.mesh, bytes);
+        print::out(&format!("{}{written}\n{}\n", table(&healed), verdict(&healed)))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn as_json(defects: &Defects) -> Value {
+    let mut object: Map<String, Value> =
+        defects.counts()[..11].iter().map(|(name, n)| (name.replace([' ', '-'], "_"), json!(n))).collect();
+    object.insert("self_intersections".to_owned(), json!(defects.self_intersections));
+    Value::Object(object)
+}
+
+fn table(healed: &Healed) -> String {
+    let mut table = Table::default();
+    let (before, after) = (healed.before.counts(), healed.after.counts());
+    let found: Vec<usize> = (0..11).filter(|&i| before[i].1 + after[i].1 > 0).collect();
+    let most = Defects::MOST as u64;
+    let words = |defects: &Defects| {
+        defects.self_intersections.map(|n| if n > most { format!("over {}", count(most)) } else { count(n) })
+    };
+    let crosses = [&healed.before, &healed.after].iter().any(|d| d.self_intersections.is_some_and(|n| n > 0));
+    if !found.is_empty() || crosses {
+        table.line("", &["before", "after"].map(|name| Some(name.to_owned())));
+    }
+    for i in found {
+        table.line(before[i].0, &[before[i].1, after[i].1].map(|n| Some(count(n))));
+    }
+    if crosses {
+        table.line("self-intersections", &[&healed.before, &healed.after].map(words));
+    }
+    let mut text = table.to_string();
+    for step in &healed.steps {
+        let undone = if step.is_undone { " (undone: something else was worse for it)" } else { "" };
+        let _ = writeln!(text, "  {} {}{undone}", step.name, count(step.count));
+    }
+    text
+}
+
+fn verdict(healed: &Healed) -> String {
+    if healed.after.is_none() {
+        return if healed.steps.is_empty() { "nothing to heal" } else { "healed: closed, manifold, oriented" }
+            .to_owned();
+    }
+    "what is left needs more: zmend repair makes a solid of it, with a surface that is made anew".to_owned()
+}
