@@ -53,7 +53,7 @@
 //! |---|---|
 //! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
 //! | [`mesh`] | [`Mesh`], reports and validation, neighbourhoods ([`Topology`](mesh::Topology)), features, local repairs ([`Mesh::heal`]), editing ([`Edit`](mesh::Edit)), self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
-//! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF |
+//! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF; [volumes](io::volume): `MetaImage`, NRRD, `NIfTI`, VTI, VTK, SLC |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
 //! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring; of volumes in [`contour::volume`] |
@@ -87,7 +87,8 @@
 //!
 //! `cli` (on by default) builds the program `zmend` and brings its dependencies: libraries say `default-features = false`. `render`
 //! (part of `cli`) adds the module `render` and the dependency `png`; `gltf` and `3mf` (parts of `cli`) add these formats, and the
-//! dependencies `serde_json` for the one, `flate2` and `quick-xml` for the other.
+//! dependencies `serde_json` for the one, `flate2` and `quick-xml` for the other, as does `volumes` (part of `cli`) for VTI files and packed data
+//! in files of volumes.
 #![forbid(unsafe_code)]
 
 pub mod contour;
@@ -112,7 +113,8 @@ pub use error::{Error, Place, Result};
 pub use glam;
 pub use mesh::{Mesh, Polygons};
 pub use repair::{
-    Faces, Inside, Keep, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into, solidify,
+    Faces, Inside, Keep, Offset, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into,
+    solidify,
 };
 
 /// The examples of the README are tests.

@@ -18,7 +18,7 @@
 //! Scenes of parts (glTF, 3MF) become one mesh, with the transforms of their nodes, items and components applied.
 //!
 //! Signed octrees in SOF, SOG and DCF files ([`OctreeFormat`]) come and go by [`read_octree`], [`write_sof`], [`write_sog`] and
-//! [`write_dcf`].
+//! [`write_dcf`]. Volumes have a [module](volume) of their own.
 //!
 //! ```
 //! use zmend::io;
@@ -50,6 +50,7 @@ mod stl;
 mod text;
 #[cfg(feature = "3mf")]
 mod threemf;
+pub mod volume;
 mod write;
 
 pub use encode::Precision;

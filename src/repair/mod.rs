@@ -6,10 +6,11 @@ mod memory;
 mod options;
 mod refined;
 mod report;
+mod sampled;
 mod solid;
 mod trace;
 
-pub use crate::sign::{Keep, Kept, Thicken};
+pub use crate::sign::{Keep, Kept, Offset, Thicken};
 pub use inside::{InsideChoice, Reason};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
@@ -20,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::geom::Frame;
 use crate::mesh::{Bounds, Mesh, MeshSink, MeshSizes, TriangleSource};
 use crate::progress::{Progress, Silent, Stage};
-use crate::sign::{check_gap, check_width, keep, thicken};
+use crate::sign::{check_gap, check_width, keep, offset, thicken};
 use inside::{Told, tell};
 use memory::{Guard, GuardedSink};
 use report::Clock;
@@ -134,6 +135,10 @@ fn mend(
     if let Some(width) = options.thicken {
         octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
     }
+    if let Some(by) = options.offset {
+        let with_normals = options.surface.needs_normals();
+        octree = clock.time(Stage::Sign, || offset(&octree, source, &frame, by, with_normals, progress))?;
+    }
     let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities, progress))?;
     let mut solid = Solid::new(octree, frame);
     let mut topology = None;
@@ -155,7 +160,10 @@ fn mend(
         (closing.rings, Warning::HolesClosed),
         (counts.merged_walls, Warning::WallsMerged),
         (clipped, Warning::Clipped),
-        (if options.thicken.is_none() { percent(vanished, counts.hits) } else { 0 }, Warning::FacesVanished),
+        (
+            if options.thicken.is_none() && options.offset.is_none() { percent(vanished, counts.hits) } else { 0 },
+            Warning::FacesVanished,
+        ),
     ];
     warnings.extend(noted.into_iter().filter(|(n, _)| *n > 0).map(|(n, warning)| warning(n)));
     let report = RepairReport {
@@ -187,6 +195,7 @@ fn check(options: &Options, frame: &Frame) -> Result<()> {
         }
         check_gap(gap, frame)?;
     }
+    options.offset.map_or(Ok(()), |offset| offset.check(frame))?;
     options.thicken.map_or(Ok(()), |width| check_width(width, frame))
 }
 

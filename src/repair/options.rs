@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::geom::{Cube, Frame};
 use crate::mesh::Bounds;
-use crate::sign::{Keep, Thicken};
+use crate::sign::{Keep, Offset, Thicken};
 use crate::topology;
 
 /// How to repair: `Options { depth: 9, ..Options::default() }`.
@@ -39,6 +39,8 @@ pub struct Options {
     pub thicken: Option<f64>,
     /// Which faces get that wall. Default [`Thicken::Sheets`].
     pub thicken_what: Thicken,
+    /// Another surface at a distance of this one: larger or smaller solids, or a shell round it. Default none.
+    pub offset: Option<Offset>,
     /// Which solids stay. Default [`Keep::All`].
     pub keep: Keep,
     /// Whether cavities of solids are filled. Default no.
@@ -63,6 +65,7 @@ impl Default for Options {
             gap: None,
             thicken: None,
             thicken_what: Thicken::default(),
+            offset: None,
             keep: Keep::default(),
             drop_cavities: false,
             topology: topology::Options::default(),
@@ -87,10 +90,11 @@ impl Options {
         frame.check_holds(&if bounds.is_empty() { *bounds } else { *model }).map(|()| frame)
     }
 
-    /// Bounds with room for walls and for what closes gaps.
+    /// Bounds with room for walls, offsets, and for what closes gaps.
     fn with_room(&self, bounds: &Bounds) -> Bounds {
         let room = |width: Option<f64>| width.filter(|w| w.is_finite() && *w > 0.0).unwrap_or(0.0);
-        let margin = 0.5 * room(self.thicken).max(room(self.gap));
+        let offset = room(self.offset.map(Offset::distance));
+        let margin = (0.5 * room(self.thicken).max(room(self.gap))).max(offset);
         Bounds { min: bounds.min - margin, max: bounds.max + margin }
     }
 }

@@ -11,6 +11,7 @@
 //! | a function of the lattice point | [`Samples`] |
 //! | a continuous function of the place, of which surface and normals shall be exact | [`LevelSet`] |
 //! | a part of another volume | [`Cropped`] |
+//! | samples of any number type that are owned, with their place: what files are read into | [`Image`] |
 //! | one of several materials, told apart by their numbers | [`Label`] |
 //!
 //! # Inside
@@ -24,13 +25,16 @@
 //!
 //! This module knows numbers and places only; surfaces are made by [`contour::volume`](crate::contour::volume).
 
+pub mod cubic;
 mod dense;
 mod field;
+pub mod image;
 mod label;
 mod placement;
 
 pub use dense::{Dense, Sample};
 pub use field::{Cropped, LevelSet, Samples};
+pub use image::{Image, Voxels};
 pub use label::Label;
 pub use placement::Placement;
 

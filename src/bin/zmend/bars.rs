@@ -5,22 +5,32 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Duration;
 use zmend::progress::{Progress, Stage};
+use zmend::{Error, Result};
 
 /// A line on standard error that shows how far the running stage is. Without a terminal it shows nothing.
 pub(crate) struct Bars {
     bar: ProgressBar,
+    /// Bytes that the work may hold, if that is for this to say.
+    limit: Option<u64>,
 }
 
 impl Bars {
     /// Shows nothing yet, and never anything when not `visible`.
     pub(crate) fn new(visible: bool) -> Self {
         if !(visible && std::io::stderr().is_terminal()) {
-            return Bars { bar: ProgressBar::hidden() };
+            return Bars { bar: ProgressBar::hidden(), limit: None };
         }
         let bar = ProgressBar::no_length();
         // The bar moves although a stage says nothing for a while.
         bar.enable_steady_tick(Duration::from_millis(100));
-        Bars { bar }
+        Bars { bar, limit: None }
+    }
+
+    /// Refuses work that holds more bytes than these.
+    pub(crate) fn within(self, limit: Option<u64>) -> Self {
+        let mut bars = self;
+        bars.limit = limit;
+        bars
     }
 
     /// Begins a line for a piece of work; `total` is 0 when it is not known how much there is.
@@ -52,6 +62,16 @@ impl Progress for Bars {
 
     fn advance(&self, amount: u64) {
         self.bar.inc(amount);
+    }
+
+    fn hold(&self, bytes: u64) -> Result<()> {
+        match self.limit {
+            Some(limit) if bytes > limit => {
+                let remedy = "crop the volume, or sample it anew with larger cells: --cell".to_owned();
+                Err(Error::Memory { needed: bytes, limit, remedy })
+            }
+            _ => Ok(()),
+        }
     }
 
     fn is_cancelled(&self) -> bool {

@@ -27,8 +27,13 @@ pub(crate) fn choose(bounds: &Bounds, options: &Options, format: Format, is_text
 /// The same where the grid is known.
 pub(crate) fn of_frame(frame: &Frame, format: Format, is_text: bool) -> Result<(Precision, bool)> {
     let corners = Bounds { min: frame.origin(), max: frame.origin() + frame.size() };
-    let far = farthest(&corners);
-    chosen(need_at(far, frame.cell_size()), far, format, is_text)
+    of_box(&corners, frame.cell_size(), format, is_text)
+}
+
+/// The same for points within a box, in cells of a size.
+pub(crate) fn of_box(bounds: &Bounds, cell: f64, format: Format, is_text: bool) -> Result<(Precision, bool)> {
+    let far = farthest(bounds);
+    chosen(need_at(far, cell), far, format, is_text)
 }
 
 fn chosen(need: Need, far: f64, format: Format, is_text: bool) -> Result<(Precision, bool)> {

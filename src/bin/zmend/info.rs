@@ -2,21 +2,23 @@
 
 use crate::args::InfoArgs;
 use crate::details::Details;
-use crate::measure::{Loaded, Measured, Side};
+use crate::measure::{self, Measured, Side};
 use crate::print::{self, Table};
 use crate::units::{real, vector};
+use crate::volume::Loaded;
 use crate::{json, units};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use zmend::Result;
+use zmend::io::volume::{VolumeFormat, VolumeOptions};
 use zmend::io::{self, Format, InputInfo, OctreeFormat};
 use zmend::progress::Silent;
 
 pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     let mut code = ExitCode::SUCCESS;
     for (i, path) in args.files.iter().enumerate() {
-        if let Some(result) = look_at_octree(path, args.json).transpose() {
+        if let Some(result) = look_at_other(path, args.json).transpose() {
             match result {
                 Ok(text) => print::out(&if i > 0 && !args.json { format!("\n{text}") } else { text })?,
                 Err(error) => {
@@ -43,8 +45,18 @@ pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
 }
 
 fn look(path: &Path, quick: bool) -> Result<(InputInfo, Measured, Details)> {
-    let file = Loaded::open(path)?;
+    let file = measure::Loaded::open(path)?;
     Ok((file.info().clone(), file.measured(quick), Details::of(file.mesh())))
+}
+
+/// What is to be said of a file that is no mesh; `None` of meshes.
+fn look_at_other(path: &Path, is_json: bool) -> Result<Option<String>> {
+    // Files that cannot be read are told by those who read them.
+    if path.is_file() && VolumeFormat::of_file(path).ok().flatten().is_some() {
+        let told = Loaded::read(path, &VolumeOptions::default(), &Silent)?.told;
+        return Ok(Some(if is_json { format!("{}\n", told.json()) } else { told.text() }));
+    }
+    look_at_octree(path, is_json)
 }
 
 /// What is to be said of an octree file; `None` of others.

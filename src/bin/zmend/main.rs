@@ -6,6 +6,7 @@ mod compare;
 mod convert;
 mod details;
 mod digits;
+mod extract;
 mod features;
 mod goal;
 mod handles;
@@ -23,6 +24,7 @@ mod solid;
 mod summary;
 mod topology;
 mod units;
+mod volume;
 
 use args::{Args, Command};
 use std::process::ExitCode;
@@ -51,6 +53,8 @@ fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Repair(args) => repair::run(args),
         Command::Topology(args) => topology::run(args),
+        Command::Extract(args) => extract::run(args),
+        Command::Remesh(args) => repair::remesh(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Heal(args) => heal::run(args),

@@ -1,10 +1,10 @@
-//! `zmend repair`: the main job.
+//! `zmend repair`, the main job, and `zmend remesh`, which is one with another surface.
 
-use crate::args::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
+use crate::args::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
-use crate::solid::{self, Job};
+use crate::solid::{self, Job, Work};
 use crate::summary::Summary;
 use crate::{digits, goal, interrupt, memory};
 use glam::DVec3;
@@ -15,23 +15,36 @@ use std::time::Instant;
 use zmend::io::{self, Format, Input, OctreeFormat, WriteOptions};
 use zmend::mesh::{Bounds, MeshSizes, SourceCounts, TriangleSource};
 use zmend::progress::{Progress, Stage};
-use zmend::{Faces, Options, Result, repair_into, topology};
+use zmend::{Error, Faces, Offset, Options, Result, repair_into, topology};
 
 /// Meshes of more faces are only measured on demand: measuring these takes some tenths of a second.
 const SMALL: u64 = 1_000_000;
 
 pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
-    let RepairArgs { input, work: args, .. } = repair;
-    let goal = repair.goal();
+    make(&repair.input, repair.goal(), &repair.work, None)
+}
+
+/// `zmend remesh`: a repair whose surface lies elsewhere.
+pub(crate) fn remesh(args: &RemeshArgs) -> Result<ExitCode> {
+    if let (Some(format), Some(_)) = (OctreeFormat::of_file(&args.input)?, args.offset()) {
+        let problem = format!("{} is an octree ({format}): distances are those to faces", args.input.display());
+        return Err(Error::setting("offset", problem, "make a mesh of it with `zmend repair` first"));
+    }
+    make(&args.input, &args.out, &args.work, args.offset())
+}
+
+fn make(input: &Path, goal: &Path, args: &WorkArgs, offset: Option<Offset>) -> Result<ExitCode> {
     let format = goal::format(goal, args.write.format.map(Into::into))?;
     goal::check(goal, &[input], args.write.force)?;
     let topology = args.handles.options();
+    crate::volume::refuse(input)?;
     let (None, GoalFormat::Mesh(format)) = (OctreeFormat::of_file(input)?, format) else {
-        let (surface, skeleton, patches) = (SurfaceArg::Mc, None, None);
-        let job = Job { input, goal, to: format, work: args, topology, surface, skeleton, patches };
+        let mut work = Work::new(args, SurfaceArg::Mc);
+        work.options.offset = offset;
+        let job = Job { input, goal, to: format, work, topology, volume: None, skeleton: None, patches: None };
         return solid::run(&job).map(|()| ExitCode::SUCCESS);
     };
-    let mut options = Options { topology, ..options(args, SurfaceArg::Mc) };
+    let mut options = Options { topology, offset, ..options(args, SurfaceArg::Mc) };
     if format.has_only_triangles() {
         // The surface knows better than the writer which diagonals to take.
         options.faces = Faces::Triangles;
@@ -62,7 +75,7 @@ pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
     let peak_memory = memory::peak();
     bars.start("measure", 0);
     let before = before(&source.input, args.tell.report)?;
-    let after = after(report.sizes, report.volume, goal, bytes, args.tell.report)?;
+    let after = after(report.sizes, Some(report.volume), goal, bytes, args.tell.report)?;
     drop(bars);
     // The reading was done before the repair asked for it.
     let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read).map(|&(s, time)| (s.name(), time));
@@ -99,6 +112,7 @@ pub(crate) fn options(args: &WorkArgs, surface: SurfaceArg) -> Options {
         gap: args.inside.gap,
         thicken: args.inside.thicken,
         thicken_what: args.inside.thicken_what.into(),
+        offset: None,
         keep: args.inside.keep,
         drop_cavities: args.inside.drop_cavities,
         surface: args.surface.kind_or(surface).into(),
@@ -170,8 +184,8 @@ fn before(input: &Input, report: ReportArg) -> Result<Side> {
     Ok(Side::new(info, measured.then(|| Measured::input(input)).transpose()?))
 }
 
-/// What is known of the written surface, given its size and the volume that it encloses.
-pub(crate) fn after(sizes: MeshSizes, volume: f64, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
+/// What is known of the written surface, given its size and the volume that it encloses, if that is known.
+pub(crate) fn after(sizes: MeshSizes, volume: Option<f64>, goal: &Path, bytes: u64, asked: ReportArg) -> Result<Side> {
     let MeshSizes { points, faces, corners } = sizes;
     let is_known = goal.is_file() && is_measured(faces, asked);
     Ok(Side {
@@ -180,7 +194,7 @@ pub(crate) fn after(sizes: MeshSizes, volume: f64, goal: &Path, bytes: u64, aske
         faces,
         // Closed and manifold by construction: every edge has two corners.
         euler: Some(points as i64 - (corners / 2) as i64 + faces as i64),
-        volume: Some(volume),
+        volume,
         measured: is_known.then(|| Measured::file(goal)).transpose()?,
     })
 }

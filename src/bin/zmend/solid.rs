@@ -1,12 +1,13 @@
 //! The pipeline step by step, where a solid is what comes in, or what goes out, or what is worked on: octree files and topology.
 
-use crate::args::{SurfaceArg, WorkArgs};
+use crate::args::{SurfaceArg, TellArgs, VolumeArgs, WorkArgs, WriteArgs};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::handles;
 use crate::measure::{Measured, Side};
 use crate::repair::{self, Bounded, after};
 use crate::summary::surface_name;
+use crate::volume::{self, Loaded, Told};
 use crate::{digits, interrupt, json, memory, print, units};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -23,14 +24,41 @@ pub(crate) struct Job<'a> {
     pub(crate) input: &'a Path,
     pub(crate) goal: &'a Path,
     pub(crate) to: GoalFormat,
-    pub(crate) work: &'a WorkArgs,
+    pub(crate) work: Work<'a>,
     /// What becomes of handles and tunnels.
     pub(crate) topology: topology::Options,
-    /// The surface if none is asked for.
-    pub(crate) surface: SurfaceArg,
+    /// What is said of the input in case that it is a volume, where volumes are taken.
+    pub(crate) volume: Option<&'a VolumeArgs>,
     /// Where skeleton and membranes are written.
     pub(crate) skeleton: Option<&'a Path>,
     pub(crate) patches: Option<&'a Path>,
+}
+
+/// How it is done.
+#[derive(Clone)]
+pub(crate) struct Work<'a> {
+    pub(crate) options: Options,
+    /// Which option that places the grid was given, if any was.
+    pub(crate) given: Option<&'static str>,
+    /// Side of a cell.
+    pub(crate) cell: Option<f64>,
+    pub(crate) max_memory: Option<u64>,
+    pub(crate) write: &'a WriteArgs,
+    pub(crate) tell: &'a TellArgs,
+}
+
+impl<'a> Work<'a> {
+    /// What is asked for; with this surface if none is.
+    pub(crate) fn new(args: &'a WorkArgs, surface: SurfaceArg) -> Self {
+        Work {
+            options: repair::options(args, surface),
+            given: args.grid.given,
+            cell: args.grid.cell,
+            max_memory: args.grid.max_memory,
+            write: &args.write,
+            tell: &args.tell,
+        }
+    }
 }
 
 /// What came out.
@@ -55,41 +83,64 @@ struct Outcome<'a> {
 pub(crate) enum Source {
     Octree(OctreeInfo),
     Mesh(Box<RepairReport>),
+    Volume(Box<Told>),
 }
 
 /// The time that each piece of work took.
 pub(crate) type Times = Vec<(&'static str, Duration)>;
 
-/// Reads an octree, or makes one of a mesh; topology is left to the caller.
-pub(crate) fn open(path: &Path, work: &WorkArgs, options: &mut Options, bars: &Bars) -> Result<(Solid, Source, Times)> {
+/// Reads an octree, or makes one of a volume or a mesh; topology is left to the caller.
+pub(crate) fn open(
+    path: &Path,
+    work: &Work<'_>,
+    volume: Option<&VolumeArgs>,
+    bars: &Bars,
+) -> Result<(Solid, Source, Times)> {
     let from = OctreeFormat::of_file(path)?;
-    if let (Some(_), Some(option)) = (from, work.grid.given) {
-        let problem = format!("{} has a grid of its own", path.display());
-        return Err(Error::setting(option, problem, "leave this option away"));
+    let has_grid = || format!("{} has a grid of its own", path.display());
+    let is_volume = volume::is_volume(path, volume)?;
+    if let (false, Some(option)) = (is_volume, volume.and_then(VolumeArgs::given)) {
+        let problem = format!("{} is no volume", path.display());
+        return Err(Error::setting(option, problem, "leave this option away, or say what it is with --raw"));
+    }
+    if let (true, Some(option)) = (from.is_some(), work.given) {
+        return Err(Error::setting(option, has_grid(), "leave this option away"));
     }
     let start = Instant::now();
-    if from.is_some() {
+    if from.is_some() && !is_volume {
         let file = io::read_octree(path, bars)?;
         let info = file.info.clone();
         return Ok((Solid::from(file), Source::Octree(info), vec![("read", start.elapsed())]));
     }
+    if let (true, Some(args)) = (is_volume, volume) {
+        if let Some(option) = work.given.filter(|&option| option != "cell") {
+            return Err(Error::setting(option, has_grid(), "leave this option away, or say --cell"));
+        }
+        let (loaded, level) = Loaded::open(path, args, bars)?;
+        let read = start.elapsed();
+        let (solid, told) = loaded.solid(level, work.cell, bars)?;
+        let times = vec![("read", read), (Stage::Sign.name(), start.elapsed().saturating_sub(read))];
+        return Ok((solid, Source::Volume(Box::new(told)), times));
+    }
     let mut input = Bounded::open(path)?;
     let read = start.elapsed();
-    options.max_memory = memory::limit(work.grid.max_memory)?;
-    options.topology = topology::Options::default();
-    let (solid, report) = solidify(&mut input, options, bars)?;
+    let options = Options { max_memory: memory::limit(work.max_memory)?, ..work.options };
+    let (solid, report) = solidify(&mut input, &options, bars)?;
     let stages = report.times.iter().filter(|(stage, _)| *stage != Stage::Read);
     let times = [("read", read)].into_iter().chain(stages.map(|&(stage, time)| (stage.name(), time))).collect();
     Ok((solid, Source::Mesh(Box::new(report)), times))
 }
 
 pub(crate) fn run(job: &Job<'_>) -> Result<()> {
-    let work = job.work;
-    let bars = Bars::new(!work.tell.quiet && !work.tell.json);
-    let mut options = repair::options(work, job.surface);
-    options.surface = surface_of(options.surface, job.to);
+    let mut work = job.work.clone();
+    work.options.surface = surface_of(work.options.surface, job.to);
+    let mut bars = Bars::new(!work.tell.quiet && !work.tell.json);
+    if volume::is_volume(job.input, job.volume)? {
+        bars = bars.within(memory::limit(work.max_memory)?);
+    }
     let start = Instant::now();
-    let (mut solid, source, mut times) = open(job.input, work, &mut options, &bars)?;
+    let (mut solid, source, mut times) = open(job.input, &work, job.volume, &bars)?;
+    let mut options = work.options;
     let cell = solid.frame.cell_size();
     let mut topology = None;
     if !job.topology.is_nothing() || job.skeleton.is_some() || job.patches.is_some() {
@@ -175,6 +226,7 @@ impl Source {
                 json!({ "path": path.display().to_string(), "polygons": report.scan.source.polygons })
             }
             Source::Octree(info) => json::octree_file(info),
+            Source::Volume(told) => told.json(),
         }
     }
 
@@ -182,6 +234,7 @@ impl Source {
     pub(crate) fn warnings(&self, to: GoalFormat) -> Vec<String> {
         match self {
             Source::Mesh(report) => report.warnings.iter().map(ToString::to_string).collect(),
+            Source::Volume(told) => told.warnings(),
             Source::Octree(info) => {
                 let ignored = units::counted(info.trailing_bytes, "byte", "bytes");
                 let missing = units::counted(info.missing_samples, "crossed edge", "crossed edges");
@@ -214,7 +267,7 @@ impl Outcome<'_> {
         let Outcome { job, solid, .. } = self;
         let volume = solid.signed().volume() * solid.frame.cell_size().powi(3);
         let report = job.work.tell.report;
-        self.sizes.map(|sizes| after(sizes, volume, job.goal, self.bytes, report)).transpose()
+        self.sizes.map(|sizes| after(sizes, Some(volume), job.goal, self.bytes, report)).transpose()
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -242,6 +295,11 @@ impl Outcome<'_> {
         let Job { input, goal, to, .. } = job;
         let cells = 1u64 << solid.frame.depth();
         let mut table = print::Table::default();
+        let mut level = String::new();
+        if let Source::Volume(told) = &self.source {
+            told.lines(&mut table);
+            level = format!(", what is {}", told.level_words());
+        }
         table.line("surface cells", &[Some(units::count(self.surface_cells()))]);
         table.line("crossed edges", &[Some(units::count(solid.signed().crossings().len() as u64))]);
         match after {
@@ -256,7 +314,7 @@ impl Outcome<'_> {
         let of_report = |report| handles::report_text(report, &solid.frame, self.cell, job.topology.measure);
         let topology = self.topology.as_ref().map_or(String::new(), of_report);
         format!(
-            "{input} -> {goal}: {to} on a grid of {cells} cells a side, each {cell} wide\n\n{table}\n{topology}{times}{memory}\n{verdict}\n"
+            "{input} -> {goal}: {to}{level} on a grid of {cells} cells a side, each {cell} wide\n\n{table}\n{topology}{times}{memory}\n{verdict}\n"
         )
     }
 
@@ -294,7 +352,7 @@ impl Outcome<'_> {
 }
 
 /// What came out, in words.
-fn verdict(after: Option<&Side>) -> String {
+pub(crate) fn verdict(after: Option<&Side>) -> String {
     match after {
         None => "an octree file: `zmend repair` makes a surface of it".to_owned(),
         Some(side) if side.faces == 0 => "empty".to_owned(),

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 use zmend::io::{Format, InputInfo, Precision};
 use zmend::repair::Kept;
-use zmend::{Inside, Keep, Options, RepairReport, Result, Surface};
+use zmend::{Inside, Keep, Offset, Options, RepairReport, Result, Surface};
 
 /// All that a repair has to tell.
 pub(crate) struct Summary<'a> {
@@ -84,6 +84,8 @@ impl Summary<'_> {
                 "inside": inside_name(self.options.inside),
                 "gap": self.options.gap,
                 "thicken": self.options.thicken,
+                "offset": self.options.offset.map(Offset::distance),
+                "shell": matches!(self.options.offset, Some(Offset::Shell(_))),
                 "thicken_what": format!("{:?}", self.options.thicken_what).to_lowercase(),
                 "keep": keep_name(self.options.keep),
                 "drop_cavities": self.options.drop_cavities,

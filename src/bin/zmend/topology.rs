@@ -4,8 +4,8 @@ use crate::args::{Form, SurfaceArg, TopologyArgs};
 use crate::bars::Bars;
 use crate::goal::{self, GoalFormat};
 use crate::handles::{self, betti_json, handle_json};
-use crate::solid::{self, Job, open};
-use crate::{json, print, repair, units};
+use crate::solid::{self, Job, Work, open};
+use crate::{json, memory, print, units, volume};
 use serde_json::json;
 use std::process::ExitCode;
 use zmend::io::{self, OctreeFormat};
@@ -31,8 +31,9 @@ pub(crate) fn run(args: &TopologyArgs) -> Result<ExitCode> {
     };
     let to = goal::format(goal, work.write.format.map(Into::into))?;
     goal::check(goal, &[input], work.write.force)?;
-    let surface = default_surface(args)?;
-    solid::run(&Job { input, goal, to, work, topology, surface, skeleton, patches }).map(|()| ExitCode::SUCCESS)
+    let work = Work::new(work, default_surface(args)?);
+    let volume = Some(&args.volume);
+    solid::run(&Job { input, goal, to, work, topology, volume, skeleton, patches }).map(|()| ExitCode::SUCCESS)
 }
 
 /// SOG files have the points of dual contouring.
@@ -44,9 +45,11 @@ fn default_surface(args: &TopologyArgs) -> Result<SurfaceArg> {
 /// Lists what there is.
 fn list(args: &TopologyArgs) -> Result<()> {
     let TopologyArgs { input, work, .. } = args;
-    let bars = Bars::new(!work.tell.quiet && !work.tell.json);
-    let mut options = repair::options(work, SurfaceArg::Mc);
-    let (solid, source, _) = open(input, work, &mut options, &bars)?;
+    let mut bars = Bars::new(!work.tell.quiet && !work.tell.json);
+    if volume::is_volume(input, Some(&args.volume))? {
+        bars = bars.within(memory::limit(work.grid.max_memory)?);
+    }
+    let (solid, source, _) = open(input, &Work::new(work, SurfaceArg::Mc), Some(&args.volume), &bars)?;
     let frame = &solid.frame;
     let cell = frame.cell_size();
     let asked = work.handles.options().in_cells(cell);

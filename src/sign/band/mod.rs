@@ -253,11 +253,7 @@ impl Band {
             return (0.5, if from.is_finite() { normal } else { -normal });
         }
         let slopes = [a, b].map(|n| f64::from(n[axis.index()]));
-        let value = |t: f64| {
-            let s = 1.0 - t;
-            from * s * s * (1.0 + 2.0 * t) + to * t * t * (1.0 + 2.0 * s) + slopes[0] * t * s * s
-                - slopes[1] * t * t * s
-        };
+        let value = |t: f64| between([from, to], slopes, t);
         let (mut near, mut far) = if from <= to { (0.0, 1.0) } else { (1.0, 0.0) };
         for _ in 0..20 {
             let middle = 0.5 * (near + far);
@@ -266,6 +262,12 @@ impl Band {
         let t = 0.5 * (near + far);
         (t, a.lerp(b, t as f32))
     }
+}
+
+/// The cubic with these values and slopes at 0 and 1.
+pub(super) fn between([from, to]: [f64; 2], slopes: [f64; 2], t: f64) -> f64 {
+    let s = 1.0 - t;
+    from * s * s * (1.0 + 2.0 * t) + to * t * t * (1.0 + 2.0 * s) + slopes[0] * t * s * s - slopes[1] * t * t * s
 }
 
 #[cfg(test)]

@@ -5,12 +5,14 @@ mod local;
 mod repair;
 mod topology;
 mod values;
+mod volume;
 
 pub(crate) use compare::CompareArgs;
 pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
-pub(crate) use repair::{FacesArg, RepairArgs, ReportArg, SurfaceArg, WorkArgs};
+pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
+pub(crate) use volume::{ExtractArgs, VolumeArgs};
 
 use repair::GridArgs;
 
@@ -35,6 +37,7 @@ Examples:
   zmend info broken.ply                       what is wrong with it
   zmend repair broken.ply fixed.ply           repair it
   zmend topology fixed.ply clean.ply --cut 2  cut its thin handles
+  zmend extract scan.mhd scan.ply --iso 300   the surface of a volume
   zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
@@ -55,6 +58,7 @@ pub(crate) fn parse() -> Args {
     let work = match &mut args.command {
         Command::Repair(args) => Some(&mut args.work),
         Command::Topology(args) => Some(&mut args.work),
+        Command::Remesh(args) => Some(&mut args.work),
         _ => None,
     };
     if let (Some(work), Some((_, matches))) = (work, matches.subcommand()) {
@@ -76,6 +80,8 @@ fn words() -> impl Iterator<Item = OsString> {
 pub(crate) enum Command {
     Repair(RepairArgs),
     Topology(TopologyArgs),
+    Extract(ExtractArgs),
+    Remesh(RemeshArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Heal(HealArgs),
@@ -85,7 +91,7 @@ pub(crate) enum Command {
     Render(RenderArgs),
 }
 
-/// Tell what a mesh is, what is wrong with it, and what to do.
+/// Tell what a mesh is, what is wrong with it, and what to do; or what values a volume has.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -97,7 +103,7 @@ The triangles of STL files are taken as connected where their corners are identi
 Self-intersections are pairs of faces that meet anywhere but in common corners and edges: faces that pass through each \
 other, touch, or fold over each other. They are decided exactly, and counted up to a million.")]
 pub(crate) struct InfoArgs {
-    /// Meshes to look at, or octree files.
+    /// Meshes to look at, or octree files, or volumes.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Print one JSON object a file, each on its line.

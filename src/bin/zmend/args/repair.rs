@@ -8,7 +8,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use zmend::geom::Cube;
 use zmend::io::{Format, OctreeFormat};
-use zmend::{Keep, Thicken};
+use zmend::{Keep, Offset, Thicken};
 
 /// Make a closed, manifold, oriented surface of any mesh.
 #[derive(Debug, clap::Args)]
@@ -48,6 +48,43 @@ pub(crate) struct RepairArgs {
 
     #[command(flatten)]
     pub(crate) work: WorkArgs,
+}
+
+/// Make a surface anew, through the distance to it: with cells of a size, larger or smaller by a distance, or as a shell.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  zmend remesh part.stl even.ply --cell 0.5               faces of half a unit all over
+  zmend remesh part.stl larger.stl --cell 0.5 --offset 2      two units larger all round
+  zmend remesh part.stl smaller.stl --cell 0.5 --offset -2
+  zmend remesh scan.ply wall.stl --cell 0.2 --offset 0.4 --shell      a wall of 0.8 units along the faces
+  zmend remesh part.stl smooth.ply --cell 0.5 --surface quads
+
+Inside and outside are told as `zmend repair` does, holes are closed, and the surface is closed and manifold. Solids grow round at convex edges \
+and shrink with sharp ones, as the distance says; --surface dc keeps edges. A shell lies along all faces, whichever way they are turned, and closes \
+no holes.")]
+pub(crate) struct RemeshArgs {
+    /// Mesh to read.
+    #[arg(value_name = "IN")]
+    pub(crate) input: PathBuf,
+    /// File to write: .stl, .ply, .obj, .off, .glb or .3mf; or the octree alone, as .sof, .sog or .dcf.
+    #[arg(value_name = "OUT")]
+    pub(crate) out: PathBuf,
+    /// How far out the new surface is, in model units; below 0, how far in.
+    #[arg(long, value_name = "DISTANCE", value_parser = coordinate, allow_negative_numbers = true)]
+    offset: Option<f64>,
+    /// What is within the offset of the faces, on either side: a wall along open surfaces.
+    #[arg(long, requires = "offset")]
+    shell: bool,
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+impl RemeshArgs {
+    /// What becomes of the surface.
+    pub(crate) fn offset(&self) -> Option<Offset> {
+        self.offset.map(if self.shell { Offset::Shell } else { Offset::Solid })
+    }
 }
 
 /// What can be asked of everything that makes a solid and writes it.

@@ -2,6 +2,7 @@
 
 use super::repair::WorkArgs;
 use super::values::amount;
+use super::volume::VolumeArgs;
 use std::path::{Path, PathBuf};
 use zmend::topology::{Measure, Options};
 use zmend::{Error, Result};
@@ -19,6 +20,7 @@ Examples:
   zmend topology scan.ply clean.ply --genus 0          none is left, by the least change
   zmend topology scan.ply clean.ply --cut 4 --fill 4 --cheapest      cut or fill, whichever is smaller
   zmend topology scan.ply clean.ply --cut all --drop-islands 10 --fill-cavities inf
+  zmend topology scan.mhd clean.ply --iso 41 --genus 0      of a volume
   zmend topology part.sog clean.sog --cut 2.5          an octree again, twice as fine where anything was cut
   zmend topology part.sog clean.ply --cut all --skeleton skeleton.ply --patches patches.ply
   zmend topology part.sog 2.5 0 clean.ply -skt part.skt    as TopoMender has it, sizes in its units
@@ -31,7 +33,8 @@ TopoMender's own form takes a threshold each for cuts and fills, 0 for none. A c
 but one, staircases included."
 )]
 pub(crate) struct TopologyArgs {
-    /// An octree (.sof, .sog, .dcf), which has a grid of its own, or a mesh of any format, which is repaired on the way.
+    /// An octree (.sof, .sog, .dcf) or a volume (see `zmend help extract`), which have grids of their own, or a mesh of any format, which is
+    /// repaired on the way.
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
     /// File to write: .stl, .ply, .obj, .off, .glb or .3mf, or an octree as .sof, .sog or .dcf. Three words: THIN, GROW, OUT.
@@ -46,6 +49,8 @@ pub(crate) struct TopologyArgs {
     /// Write the membranes of cuts (red) and fills (blue): .ply or .obj.
     #[arg(long, value_name = "FILE")]
     pub(crate) patches: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) volume: VolumeArgs,
     #[command(flatten)]
     pub(crate) work: WorkArgs,
 }

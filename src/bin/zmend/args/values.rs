@@ -2,6 +2,7 @@
 
 use clap::builder::RangedI64ValueParser;
 use clap::value_parser;
+use glam::DVec3;
 use zmend::Keep;
 use zmend::geom::frame::{DEPTHS, Frame};
 use zmend::mesh::{Bounds, sample};
@@ -17,19 +18,29 @@ pub(super) fn detail_range() -> RangedI64ValueParser<u32> {
 /// A number that the library takes as scale.
 pub(super) fn scale(text: &str) -> Result<f64, String> {
     let scale = text.parse().map_err(|_| "not a number".to_owned())?;
-    let unit = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ONE };
+    let unit = Bounds { min: DVec3::ZERO, max: DVec3::ONE };
     Frame::fit(&unit, *DEPTHS.start(), scale).map(|_| scale).map_err(|e| e.to_string())
 }
 
 /// A number that the library takes as side of a cell.
 pub(super) fn cell(text: &str) -> Result<f64, String> {
     let cell = coordinate(text)?;
-    let point = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::ZERO };
+    let point = Bounds { min: DVec3::ZERO, max: DVec3::ZERO };
     Frame::fit_cells(&point, cell, 0.9).map(|_| cell).map_err(|e| e.to_string())
 }
 
 pub(super) fn coordinate(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|c: &f64| c.is_finite()).ok_or_else(|| "not a finite number".to_owned())
+}
+
+/// Distances between samples: three, or one for all axes.
+pub(super) fn spacing(text: &str) -> Result<DVec3, String> {
+    let numbers: Result<Vec<f64>, String> = text.split(',').map(|number| width(number.trim())).collect();
+    match numbers?[..] {
+        [all] => Ok(DVec3::splat(all)),
+        [x, y, z] => Ok(DVec3::new(x, y, z)),
+        _ => Err("not one length or three, such as 0.5,0.5,1.25".to_owned()),
+    }
 }
 
 /// A number of bytes with a unit: K, M, G, T (thousands) or Ki, Mi, Gi, Ti (1024), with or without a B.
@@ -140,6 +151,8 @@ mod tests {
         );
         assert_eq!((keep("all"), keep("largest")), (Ok(Keep::All), Ok(Keep::Largest)));
         assert!(["0", "-1", "1.5", "nan", "most", ""].iter().all(|bad| keep(bad).is_err()));
+        assert_eq!((spacing("2"), spacing("1, 2,0.5")), (Ok(DVec3::splat(2.0)), Ok(DVec3::new(1.0, 2.0, 0.5))));
+        assert!(["", "1,2", "1,2,0", "1,2,3,4", "x"].iter().all(|bad| spacing(bad).is_err()));
         assert_eq!(width("2.5"), Ok(2.5));
         assert!(["0", "-1", "nan", "inf", "x"].iter().all(|bad| width(bad).is_err()));
         assert_eq!(["0", "2.5", "inf", "all"].map(amount), [Ok(0.0), Ok(2.5), Ok(f64::INFINITY), Ok(f64::INFINITY)]);
