@@ -14,8 +14,8 @@
 
 use super::Block;
 use super::LinearOctree;
-use crate::grid::Key;
 use crate::grid::block::Cells;
+use crate::grid::{Corner, Key};
 use hashbrown::hash_map::Entry;
 
 /// Records for which a block makes room at a time: a family.
@@ -64,8 +64,8 @@ impl<T> Block<T> {
         }
     }
 
-    /// Makes room for `more` records; returns for how many more than before.
-    fn make_room(&mut self, more: usize) -> usize {
+    /// Makes room for `more` records, in steps of [`ROOM`]; returns for how many more than before.
+    pub(super) fn make_room(&mut self, more: usize) -> usize {
         let before = self.records.capacity();
         if before - self.records.len() < more {
             self.records.reserve_exact(more.next_multiple_of(ROOM));
@@ -74,7 +74,7 @@ impl<T> Block<T> {
     }
 
     /// Adds a record where there is no leaf.
-    fn add(&mut self, place: u32, record: T) -> usize {
+    pub(super) fn add(&mut self, place: u32, record: T) -> usize {
         let room = self.make_room(1);
         self.records.insert(self.leaves.rank(place), record);
         self.leaves |= Cells::one(place);
@@ -136,9 +136,9 @@ impl<T> LinearOctree<T> {
         (self.record_mut(cell).expect("just made"), !is_new)
     }
 
-    /// Makes all children of a cell leaves, where none is a leaf or refined. Two probes.
-    pub(super) fn add_family(&mut self, parent: Key, records: [T; 8]) {
-        let first = parent.child(crate::grid::Corner::MIN);
+    /// Makes all children of a cell leaves; it is marked as refined, and no child is a leaf or refined. One probe.
+    pub(super) fn put_family(&mut self, parent: Key, records: [T; 8]) {
+        let first = parent.child(Corner::MIN);
         let (name, place) = first.block();
         let block = self.blocks.entry(name).or_insert(Block::EMPTY);
         debug_assert!((block.nodes() & Cells::family(place)).is_empty(), "the children of {parent} are new");
@@ -147,12 +147,11 @@ impl<T> LinearOctree<T> {
         block.records.splice(rank..rank, records);
         block.leaves |= Cells::family(place);
         self.levels.add(first, 8);
-        self.refine_above(first);
     }
 
     /// Removes the children of a cell if all are leaves.
     pub(super) fn take_family(&mut self, parent: Key) -> Option<[T; 8]> {
-        let first = parent.child(crate::grid::Corner::MIN);
+        let first = parent.child(Corner::MIN);
         let (name, place) = first.block();
         let Entry::Occupied(mut entry) = self.blocks.entry(name) else { return None };
         let block = entry.get_mut();

@@ -29,7 +29,9 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+mod balance;
 mod blocks;
+mod build;
 pub(crate) mod cells;
 pub mod compact;
 pub mod components;
@@ -42,6 +44,7 @@ mod neighbour;
 mod oracle;
 pub(crate) mod point_set;
 pub mod points;
+mod refine;
 pub mod regions;
 pub mod segments;
 pub mod signed;
@@ -64,6 +67,7 @@ pub use edited::EditedOctree;
 pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
 pub use points::{CellPoints, StoredPoints};
+pub use refine::{Balance, RefineError};
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
 pub use validate::Violation;

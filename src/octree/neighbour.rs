@@ -29,7 +29,7 @@ impl<T> LinearOctree<T> {
     }
 
     /// The leaf that holds a cell which is not in the tree; likely one of the next coarser level.
-    fn leaf_around(&self, cell: Key) -> Option<(Key, &T)> {
+    pub(super) fn leaf_around(&self, cell: Key) -> Option<(Key, &T)> {
         let coarser = self.levels.occupied & ((1 << cell.level()?) - 1);
         self.search(cell.code(), coarser, coarser.checked_ilog2()?)
     }

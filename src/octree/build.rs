@@ -1,0 +1,171 @@
+//! Trees built from the root down on all threads, and trees put together.
+
+use super::{Block, LinearOctree};
+use crate::grid::block::Cells;
+use crate::grid::brick::Bits;
+use crate::grid::key::MAX_LEVEL;
+use crate::grid::{Corner, Key};
+use crate::parallel::in_order;
+use crate::progress::Silent;
+use hashbrown::hash_map::Entry;
+
+/// Levels below the root that are built by one thread; the subtrees below them, up to 8^3, by all.
+const TOP: u32 = 3;
+
+/// Building.
+impl<T: Send> LinearOctree<T> {
+    /// The tree that covers the root, in which a cell above `max_level` (18 at most) is split where `split` says so. `record` makes the
+    /// record of each leaf. Both are asked once for a cell, on any thread, in any order.
+    ///
+    /// O(n) with one probe for each cell that is split; nothing but the tree is held, and few subtrees at a time beside it.
+    ///
+    /// ```
+    /// use zmend::grid::Key;
+    /// use zmend::octree::LinearOctree;
+    ///
+    /// // Fine at the origin.
+    /// let tree = LinearOctree::build(18, |cell| cell.min_corner() == [0; 3], |leaf| leaf.size());
+    /// assert_eq!((tree.len(), tree.locate([1; 3]).unwrap().1), (1 + 7 * 18, &2));
+    /// ```
+    pub fn build(max_level: u32, split: impl Fn(Key) -> bool + Sync, record: impl Fn(Key) -> T + Sync) -> Self {
+        let max_level = max_level.min(MAX_LEVEL);
+        let mut tree = LinearOctree::new();
+        if max_level == 0 || !split(Key::ROOT) {
+            tree.insert(Key::ROOT, record(Key::ROOT));
+            return tree;
+        }
+        let mut subtrees = vec![Key::ROOT];
+        tree.refine_root();
+        for level in 0..max_level.min(TOP) {
+            let is_split = |cell: Key| level + 1 < max_level && split(cell);
+            subtrees = subtrees.into_iter().flat_map(|cell| tree.fill(cell, &is_split, &record)).collect();
+        }
+        let grow = |(): &mut (), n: usize| {
+            let mut subtree = LinearOctree::new();
+            subtree.grow(subtrees[n], max_level, &split, &record);
+            subtree
+        };
+        let append = |subtree| {
+            tree.append(subtree);
+            Ok(())
+        };
+        in_order(subtrees.len(), &Silent, || (), grow, append).expect("nothing fails or is cancelled");
+        tree
+    }
+
+    /// All below a cell that is split.
+    fn grow(&mut self, cell: Key, max_level: u32, split: &impl Fn(Key) -> bool, record: &impl Fn(Key) -> T) {
+        let below = cell.level().unwrap_or(MAX_LEVEL) + 1;
+        let is_split = |cell: Key| below < max_level && split(cell);
+        for child in self.fill(cell, &is_split, record) {
+            self.grow(child, max_level, split, record);
+        }
+    }
+}
+
+impl<T> LinearOctree<T> {
+    /// Marks the root as refined.
+    fn refine_root(&mut self) {
+        let (name, place) = Key::ROOT.block();
+        self.blocks.entry(name).or_insert(Block::EMPTY).refined |= Cells::one(place);
+    }
+
+    /// Makes the children of a cell that is marked as refined: leaves, or marked as refined and returned. One probe.
+    fn fill(
+        &mut self,
+        cell: Key,
+        is_split: &impl Fn(Key) -> bool,
+        record: &impl Fn(Key) -> T,
+    ) -> Parts {
+        let children = cell.children();
+        let (name, place) = children[0].block();
+        let refined = children.iter().enumerate().filter(|&(_, &child)| is_split(child)).fold(0, |bits, (i, _)| bits | 1 << i);
+        let block = self.blocks.entry(name).or_insert(Block::EMPTY);
+        let leaves = 8 - (refined as u8).count_ones() as usize;
+        self.room += block.make_room(leaves);
+        for (i, &child) in (0..).zip(&children).filter(|(i, _)| refined >> i & 1 == 0) {
+            block.add(place + i, record(child));
+        }
+        block.refined |= Cells(refined << place);
+        self.levels.add(children[0], leaves);
+        Parts { cell, refined: Bits(refined) }
+    }
+
+    /// Takes over the leaves of another tree, without looking whether they overlap those of this one. Of a leaf that is in both, the
+    /// record of the other stays. O(blocks) where the trees share none.
+    pub fn append(&mut self, other: Self) {
+        for (name, block) in other.blocks {
+            match self.blocks.entry(name) {
+                Entry::Vacant(slot) => {
+                    self.levels.add(name, block.leaves.count());
+                    self.room += block.records.capacity();
+                    slot.insert(block);
+                }
+                Entry::Occupied(mut slot) => {
+                    let own = slot.get_mut();
+                    own.refined |= block.refined;
+                    for (place, record) in block.leaves.places().zip(block.records) {
+                        if own.leaves.has(place) {
+                            own.records[own.leaves.rank(place)] = record;
+                        } else {
+                            self.room += own.add(place, record);
+                            self.levels.add(name, 1);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Some children of a cell.
+struct Parts {
+    cell: Key,
+    refined: Bits,
+}
+
+impl Iterator for Parts {
+    type Item = Key;
+
+    fn next(&mut self) -> Option<Key> {
+        self.refined.next().map(|i| self.cell.child(Corner::ALL[i as usize]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::octree::oracle::{points, tree};
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn a_tree_is_what_its_splits_say(points in points(5), max_level in 0..8u32) {
+            let split = |cell: Key| points.iter().any(|&p| Key::point(p).is_some_and(|p| cell.contains(p)));
+            let mut expected = LinearOctree::from_iter([(Key::ROOT, Key::ROOT.to_bits())]);
+            while let Some(leaf) = expected.keys_z().into_iter().find(|&leaf| leaf.level() < Some(max_level) && split(leaf)) {
+                expected.refine(leaf, crate::octree::Balance::Off, |child, _| child.to_bits()).expect("a leaf");
+            }
+            for threads in [1, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a few threads");
+                let tree = pool.install(|| LinearOctree::build(max_level, split, Key::to_bits));
+                prop_assert_eq!(tree.validate(), Ok(()));
+                prop_assert_eq!(&tree, &expected);
+            }
+        }
+
+        #[test]
+        fn appending_is_inserting(mut one in tree(7), other in tree(7)) {
+            let mut expected = one.clone();
+            expected.extend(other.iter().map(|(leaf, &record)| (leaf, record + 1)));
+            let mut other = other;
+            other.iter_mut().for_each(|(_, record)| *record += 1);
+            one.append(other);
+            prop_assert_eq!(&one, &expected);
+            prop_assert_eq!(one.validate(), expected.validate());
+            prop_assert_eq!(one.allocated_bytes() >= one.len() * 8, true);
+        }
+    }
+}
