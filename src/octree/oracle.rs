@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::{Balance, LinearOctree};
 use crate::grid::key::SIDE;
-use crate::grid::{Direction, Key};
+use crate::grid::{Axis, Direction, Key};
 
 /// Up to so many lattice points.
 pub(super) fn points(max: usize) -> impl Strategy<Value = Vec<[u32; 3]>> {
@@ -59,6 +59,15 @@ impl Oracle {
         let shared = meet(span(cell), beyond);
         let touches = |b: Span| meets(meet(b, shared)) && (0..3).all(|i| meet(b, beyond).0[i] < meet(b, beyond).1[i]);
         self.0.iter().filter(|&&(_, b)| touches(b)).map(|&(leaf, _)| leaf).collect()
+    }
+
+    /// The leaves that share a piece of an element, of its own dimension.
+    pub(super) fn around(&self, element: Key) -> Vec<Key> {
+        let shares = |b: Span| {
+            let (min, max) = meet(b, span(element));
+            meets((min, max)) && Axis::ALL.into_iter().all(|a| !element.dir().contains(a) || min[a.index()] < max[a.index()])
+        };
+        self.0.iter().filter(|&&(_, b)| shares(b)).map(|&(leaf, _)| leaf).collect()
     }
 
     /// The leaves.

@@ -213,8 +213,10 @@ pub struct LeavesIn<'a, T> {
     /// The children to visit: `first`, and those that differ from it along the axes of `free`.
     free: Extent,
     first: Corner,
+    /// The axes along which children on the high side come first.
+    flip: u8,
     /// Where the walk goes on.
-    next: Option<Key>,
+    pub(super) next: Option<Key>,
     /// Of level l, at l mod 4.
     recent: [(Option<Key>, Option<&'a Block<T>>); 4],
 }
@@ -233,7 +235,12 @@ impl<'a, T> LeavesIn<'a, T> {
     }
 
     fn new(tree: &'a LinearOctree<T>, cell: Key, free: Extent, first: Corner) -> Self {
-        LeavesIn { tree, cell, free, first, next: Some(cell), recent: [(None, None); 4] }
+        LeavesIn { tree, cell, free, first, flip: 0, next: Some(cell), recent: [(None, None); 4] }
+    }
+
+    /// All leaves, children in the order of their numbers with the bits of `flip` turned over.
+    pub(super) fn flipped(tree: &'a LinearOctree<T>, flip: Corner) -> Self {
+        LeavesIn { flip: flip.bits(), ..Self::new(tree, Key::ROOT, Extent::CELL, Corner::MIN) }
     }
 
     /// The block of a cell and its place there.
@@ -247,14 +254,14 @@ impl<'a, T> LeavesIn<'a, T> {
     }
 
     /// The first cell after `cell` and all it holds.
-    fn after(&self, mut cell: Key) -> Option<Key> {
+    pub(super) fn after(&self, mut cell: Key) -> Option<Key> {
         while cell != self.cell {
             let parent = cell.parent()?;
             // The next higher subset of the free axes; 0 after the last.
             let free = self.free.bits();
-            let next = (cell.corner_in_parent().bits() & free).wrapping_sub(free) & free;
+            let next = ((cell.corner_in_parent().bits() ^ self.flip) & free).wrapping_sub(free) & free;
             if next != 0 {
-                return Some(parent.child(Corner::ALL[usize::from(self.first.bits() | next)]));
+                return Some(parent.child(Corner::ALL[usize::from((self.first.bits() | next) ^ self.flip)]));
             }
             cell = parent;
         }
@@ -262,19 +269,29 @@ impl<'a, T> LeavesIn<'a, T> {
     }
 }
 
+impl<'a, T> LeavesIn<'a, T> {
+    /// Goes on from a cell to what it holds and what comes after it; gives the cell if it is a leaf.
+    #[inline]
+    pub(super) fn step(&mut self, cell: Key) -> Option<(Key, &'a T)> {
+        let (Some(block), place) = self.block(cell) else {
+            self.next = self.after(cell);
+            return None;
+        };
+        let first = || cell.child(Corner::ALL[usize::from(self.first.bits() ^ self.flip)]);
+        self.next = if block.refined.has(place) { Some(first()) } else { self.after(cell) };
+        block.get(place).map(|record| (cell, record))
+    }
+}
+
 impl<'a, T> Iterator for LeavesIn<'a, T> {
     type Item = (Key, &'a T);
 
+    #[inline]
     fn next(&mut self) -> Option<Self::Item> {
         while let Some(cell) = self.next {
-            let (Some(block), place) = self.block(cell) else {
-                self.next = self.after(cell);
-                continue;
-            };
-            let is_refined = block.refined.has(place);
-            self.next = if is_refined { Some(cell.child(self.first)) } else { self.after(cell) };
-            if let Some(record) = block.get(place) {
-                return Some((cell, record));
+            let leaf = self.step(cell);
+            if leaf.is_some() {
+                return leaf;
             }
         }
         None
