@@ -164,8 +164,8 @@ impl Domain {
         (self.to_space(cell.min_corner()), self.to_space(cell.max_corner()))
     }
 
-    /// The lattice point of a point in space: along each axis the last one that is not above it. What
-    /// [`LinearOctree::locate`] wants. Points on the far boundary are inside.
+    /// The lattice point of a point in space: along each axis the last one that is not above it, but below the far boundary, so that
+    /// points there are in the last cells. What [`LinearOctree::locate`] wants.
     ///
     /// # Errors
     ///
@@ -179,8 +179,9 @@ impl Domain {
                 return Err(Outside { axis, value, min, max });
             }
             // The quotient is off by less than a step.
-            let about = (((value - min) / (max - min) * f64::from(self.ends[i])) as u32).min(self.ends[i]);
-            let up = about < self.ends[i] && self.coordinate(i, about + 1) <= value;
+            let last = self.ends[i] - 1;
+            let about = (((value - min) / (max - min) * f64::from(self.ends[i])) as u32).min(last);
+            let up = about < last && self.coordinate(i, about + 1) <= value;
             let down = about > 0 && self.coordinate(i, about) > value;
             point[i] = about + u32::from(up) - u32::from(down);
         }
@@ -188,14 +189,15 @@ impl Domain {
     }
 
     /// A point in space in lattice coordinates, with fractions: what searches within radii and along rays, and
-    /// [`NodalOctree::value_at`](crate::octree::NodalOctree::value_at) want. Exact at lattice points, off by rounding between them; not
-    /// limited to the box.
+    /// [`NodalOctree::value_at`](crate::octree::NodalOctree::value_at) want. Exact at lattice points, the far boundary included; off by
+    /// rounding between them. Not limited to the box.
     pub fn to_lattice(&self, p: DVec3) -> [f64; 3] {
         let point = self.locate(p).ok();
         [0, 1, 2].map(|i| {
             let at = (p[i] - self.min[i]) / (self.max[i] - self.min[i]) * f64::from(self.ends[i]);
             match point.map(|point| point[i]) {
                 Some(n) if self.coordinate(i, n) == p[i] => f64::from(n),
+                _ if p[i] == self.max[i] => f64::from(self.ends[i]),
                 _ => at,
             }
         })
@@ -229,7 +231,7 @@ mod tests {
             let random = [0, 1, 2].map(|i| (share[i] * f64::from(domain.ends[i])) as u32);
             for point in [random, domain.ends, [0; 3]] {
                 let p = domain.to_space(point);
-                prop_assert_eq!(domain.locate(p), Ok(point));
+                prop_assert_eq!(domain.locate(p), Ok([0, 1, 2].map(|i| point[i].min(domain.ends[i] - 1))));
                 prop_assert_eq!(domain.to_lattice(p), point.map(f64::from));
             }
             prop_assert_eq!(domain.to_space(domain.ends), domain.max());
@@ -260,7 +262,7 @@ mod tests {
         assert_eq!(outside.to_string(), "y = -0.25 is not in the domain, 0 to 2");
         assert!(domain.locate(DVec3::new(0.5, f64::NAN, 0.0)).is_err());
         assert!(domain.locate(DVec3::new(1.0_f64.next_up(), 0.0, 0.0)).is_err());
-        assert_eq!(domain.locate(DVec3::new(1.0, 2.0, 3.0)), Ok([1 << 17, 2 << 17, 3 << 17]));
+        assert_eq!(domain.locate(DVec3::new(1.0, 2.0, 3.0)), Ok([(1 << 17) - 1, (2 << 17) - 1, (3 << 17) - 1]));
     }
 
     #[test]

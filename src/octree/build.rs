@@ -1,5 +1,6 @@
 //! Trees built from the root down on all threads, and trees put together.
 
+use super::locate::code_of;
 use super::{Block, LinearOctree};
 use crate::grid::block::Cells;
 use crate::grid::brick::Bits;
@@ -8,6 +9,8 @@ use crate::grid::{Corner, Key};
 use crate::parallel::in_order;
 use crate::progress::Silent;
 use hashbrown::hash_map::Entry;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Levels below the root that are built by one thread; the subtrees below them, up to 8^3, by all.
 const TOP: u32 = 3;
@@ -115,6 +118,50 @@ impl<T> LinearOctree<T> {
                 }
             }
         }
+    }
+}
+
+/// Trees for points.
+impl LinearOctree<Range<u32>> {
+    /// The tree that covers the root with at most `most` lattice points a leaf, but for leaves of `max_level` and those whose points all
+    /// coincide. Returns it with the order of the points along the curve: the record of a leaf is the range of its points there. Points
+    /// with a coordinate above 2^19 are left out.
+    ///
+    /// Sorts 12 bytes a point on all threads, then O(n) bisections; a point is in the range of one leaf only.
+    ///
+    /// # Panics
+    ///
+    /// If there are 2^32 points or more.
+    ///
+    /// ```
+    /// use zmend::octree::LinearOctree;
+    ///
+    /// let points = [[9, 9, 9], [500_000, 0, 0], [11, 9, 9], [9, 9, 9]];
+    /// let (tree, order) = LinearOctree::of_points(&points, 2, 18);
+    /// let (_, range) = tree.locate([9, 9, 9]).unwrap();
+    /// assert_eq!(order[range.start as usize..range.end as usize], [0, 3]);
+    /// ```
+    pub fn of_points(points: &[[u32; 3]], most: usize, max_level: u32) -> (Self, Vec<u32>) {
+        let count = u32::try_from(points.len()).expect("fewer than 2^32 points");
+        let coded = (0..count).into_par_iter().filter_map(|i| Some((code_of(points[i as usize])?, i)));
+        let mut coded: Vec<(u64, u32)> = coded.collect();
+        coded.par_sort_unstable();
+        let range = |cell: Key| {
+            // The first code in the cell, and the first beyond it: a cell's bits below its own are all those there are.
+            let first = cell.depth_first_rank() >> 5;
+            let beyond = first + u64::from(cell.size()).pow(3);
+            coded.partition_point(|&(code, _)| code < first)..coded.partition_point(|&(code, _)| code < beyond)
+        };
+        let split = |cell: Key| {
+            let inside = &coded[range(cell)];
+            inside.len() > most && inside.first().map(|p| p.0) != inside.last().map(|p| p.0)
+        };
+        let record = |leaf: Key| {
+            let range = range(leaf);
+            range.start as u32..range.end as u32
+        };
+        let tree = LinearOctree::build(max_level, split, record);
+        (tree, coded.into_iter().map(|(_, i)| i).collect())
     }
 }
 

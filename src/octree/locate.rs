@@ -73,7 +73,7 @@ fn middle(levels: u32) -> Option<u32> {
 }
 
 /// The interleaved coordinates, with those on the high faces of the root moved inside. `None` outside the root.
-fn code_of(point: [u32; 3]) -> Option<u64> {
+pub(super) fn code_of(point: [u32; 3]) -> Option<u64> {
     point.iter().all(|&x| x <= SIDE).then(|| interleave(point.map(|x| x.min(SIDE - 1))))
 }
 

@@ -204,13 +204,18 @@ impl<T, V: Value> NodalOctree<T, V> {
         })
     }
 
-    /// The field at a point in lattice coordinates, 0 ..= 2^19; `None` where there is no leaf. A search and at most 27 probes.
+    /// The field at a point in lattice coordinates, 0 ..= 2^19; `None` where no leaf is, or touches it. A search and at most 27 probes.
     pub fn value_at(&self, point: [f64; 3]) -> Option<V> {
         if !point.iter().all(|c| (0.0..=f64::from(SIDE)).contains(c)) {
             return None;
         }
-        let (leaf, _) = self.tree.locate(point.map(|c| c as u32))?;
-        self.value_in(leaf, point)
+        let floor = point.map(|c| c as u32);
+        let leaf = self.tree.locate(floor).or_else(|| {
+            // On the high side of a leaf beside a hole.
+            let low = [0, 1, 2].map(|i| floor[i] - u32::from(floor[i] > 0 && f64::from(floor[i]) == point[i]));
+            self.tree.leaves_in_box(low, floor).next()
+        })?;
+        self.value_in(leaf.0, point)
     }
 
     /// As [`value_at`](NodalOctree::value_at), by the field of this leaf, in whose closed cube the point lies. `None` if it is no leaf.
@@ -443,7 +448,12 @@ mod tests {
         for p in [[-1e-9, 0.0, 0.0], [0.0, f64::from(SIDE) * 1.0001, 0.0], [f64::NAN, 0.0, 0.0]] {
             assert_eq!(field.value_at(p), None);
         }
-        field.remove(Key::ROOT);
+        field.refine(Key::ROOT, Balance::Off, |_, &record| record).expect("a leaf");
+        Key::ROOT.children()[1..].iter().for_each(|&child| assert!(field.remove(child).is_some()));
+        let middle = f64::from(SIDE / 2);
+        assert_eq!(field.value_at([middle; 3]), field.value(Key::point([SIDE / 2; 3]).expect("inside")));
+        assert!(field.value_at([5.0, middle, middle]).is_some() && field.value_at([5.0, middle + 0.5, middle]).is_none());
+        field.remove(Key::ROOT.children()[0]);
         assert_eq!((field.value_at([5.0; 3]), field.is_empty(), field.len()), (None, true, 0));
     }
 }
