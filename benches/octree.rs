@@ -150,7 +150,7 @@ fn building(group: &mut BenchmarkGroup<'_, WallTime>) {
     group.bench_function("build, hashbrown", |b| {
         b.iter(|| {
             let mut map = hash_map();
-            descend(Key::ROOT, &mut |_| (), &mut |leaf| drop(map.insert(leaf, 0)));
+            descend(Key::ROOT, &mut |_| (), &mut |leaf| *map.entry(leaf).or_insert(0) = 0);
             map.len()
         });
     });
@@ -177,7 +177,11 @@ fn octree(criterion: &mut Criterion) {
     let grown = tree.allocated_bytes() as f64;
     tree.shrink_to_fit();
     let leaves = tree.len() as f64;
-    println!("{leaves} leaves; bytes each: {:.1}, shrunk {:.1}", grown / leaves, tree.allocated_bytes() as f64 / leaves);
+    println!(
+        "{leaves} leaves; bytes each: {:.1}, shrunk {:.1}",
+        grown / leaves,
+        tree.allocated_bytes() as f64 / leaves
+    );
     println!("ordered map: {} cells, {:.1} bytes a leaf", map.len(), of_map / leaves);
     building(&mut group);
 
@@ -273,6 +277,9 @@ fn octree(criterion: &mut Criterion) {
     group.bench_function("traverse, Z-order, all threads", |b| {
         b.iter(|| tree.par_iter_z().map(|(_, &record)| record & 1).sum::<u64>());
     });
+    let mut elements = 0;
+    tree.visit_dual(|_| elements += 1);
+    group.throughput(Throughput::Elements(elements));
     group.bench_function("traverse, dual", |b| {
         b.iter(|| {
             let mut count = 0u64;

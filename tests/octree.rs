@@ -120,7 +120,8 @@ fn a08_refinement_for_points_ends_early() {
     assert!(tree.levels().max() <= Some(5), "{:?}", tree.levels().collect::<Vec<_>>());
     let mut seen = 0;
     for (leaf, range) in tree.iter_z() {
-        let held: BTreeSet<[u32; 3]> = order[range.start as usize..range.end as usize].iter().map(|&i| points[i as usize]).collect();
+        let held: BTreeSet<[u32; 3]> =
+            order[range.start as usize..range.end as usize].iter().map(|&i| points[i as usize]).collect();
         assert!(range.len() <= 8 || held.len() == 1);
         assert!(held.iter().all(|&p| tree.locate(p).map(|(key, _)| key) == Some(leaf)));
         seen += range.len();
@@ -165,7 +166,10 @@ fn a09_regions_are_told_apart_and_outside_is_at_the_boundary() {
 fn a10_only_a_hole_in_the_wall_leaks() {
     let regions = |tree: &LinearOctree<u8>| tree.face_regions(|&r| r == 1).iter().map(|(_, &r)| r).max();
     assert_eq!(regions(&shell(|_| false)), Some(1));
-    assert_eq!(regions(&shell(|leaf| leaf.contains(Key::point([SIDE / 2, SIDE / 2, SIDE / 10 * 2]).expect("inside")))), Some(0));
+    assert_eq!(
+        regions(&shell(|leaf| leaf.contains(Key::point([SIDE / 2, SIDE / 2, SIDE / 10 * 2]).expect("inside")))),
+        Some(0)
+    );
 }
 
 /// Looking up nodes made new ones that no cell had.
@@ -187,7 +191,9 @@ fn a15_what_was_missing_is_there() {
     let leaf = tree.locate([SIDE / 2 - 1; 3]).expect("covered").0;
     let finest = tree.locate([SIDE / 2; 3]).expect("covered").0;
     assert_eq!((leaf.level(), finest.level()), (Some(1), Some(3)));
-    assert!(matches!(tree.refine_strict(finest, Balance::Corners, |_, &r| r), Err(RefineError::Blocked { by, .. }) if by == leaf));
+    assert!(
+        matches!(tree.refine_strict(finest, Balance::Corners, |_, &r| r), Err(RefineError::Blocked { by, .. }) if by == leaf)
+    );
     assert_eq!(tree.imbalance(Balance::Corners).map(|(larger, _)| larger.level()), Some(Some(1)));
     for (balance, directions) in [(Balance::Faces, 6), (Balance::Edges, 18), (Balance::Corners, 26)] {
         assert_eq!(balance.directions().count(), directions);
@@ -212,7 +218,9 @@ fn a16_order_is_along_the_curve_and_neighbours_are_arithmetic() {
             assert_eq!(beyond.is_some(), tree.neighbours(leaf, face).next().is_some());
             assert_eq!(beyond, leaf.toward(Direction::from(face)));
         }
-        assert!(Axis::ALL.into_iter().all(|a| leaf.corner(Corner::MAX).center()[a.index()] == leaf.max_corner()[a.index()]));
+        assert!(
+            Axis::ALL.into_iter().all(|a| leaf.corner(Corner::MAX).center()[a.index()] == leaf.max_corner()[a.index()])
+        );
     }
 }
 

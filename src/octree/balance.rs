@@ -46,7 +46,9 @@ impl<T> LinearOctree<T> {
         for level in made.0 {
             let mut families: Vec<Key> = level
                 .into_iter()
-                .flat_map(|(name, cells)| (0..64).step_by(8).filter(move |&p| cells.has(p)).map(move |p| name.in_block(p)))
+                .flat_map(|(name, cells)| {
+                    (0..64).step_by(8).filter(move |&p| cells.has(p)).map(move |p| name.in_block(p))
+                })
                 .filter_map(Key::parent)
                 .collect();
             families.sort_unstable();

@@ -210,7 +210,9 @@ impl<T> LinearOctree<T> {
             let gone = before & !block.leaves;
             levels.remove(name, gone.count());
             let left = block.nodes();
-            emptied.extend((0..64).step_by(8).filter(|&p| gone.byte(p) != 0 && left.byte(p) == 0).map(|p| name.in_block(p)));
+            emptied.extend(
+                (0..64).step_by(8).filter(|&p| gone.byte(p) != 0 && left.byte(p) == 0).map(|p| name.in_block(p)),
+            );
             if left.is_empty() {
                 *room -= block.records.capacity();
             }

@@ -12,15 +12,21 @@ use hashbrown::hash_map::Entry;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Levels below the root that are built by one thread; the subtrees below them, up to 8^3, by all.
+/// Regions of this level and all below them are built by one thread each.
 const TOP: u32 = 3;
+
+/// A cell with leaves inside, and which of its children have.
+struct Region {
+    cell: Key,
+    refined: u8,
+}
 
 /// Building.
 impl<T: Send> LinearOctree<T> {
     /// The tree that covers the root, in which a cell above `max_level` (18 at most) is split where `split` says so. `record` makes the
     /// record of each leaf. Both are asked once for a cell, on any thread, in any order.
     ///
-    /// O(n) with one probe for each cell that is split; nothing but the tree is held, and few subtrees at a time beside it.
+    /// O(n): a block is made at once, with one probe. Nothing but the tree is held, and few subtrees at a time beside it.
     ///
     /// ```
     /// use zmend::grid::Key;
@@ -37,66 +43,96 @@ impl<T: Send> LinearOctree<T> {
             tree.insert(Key::ROOT, record(Key::ROOT));
             return tree;
         }
-        let mut subtrees = vec![Key::ROOT];
-        tree.refine_root();
-        for level in 0..max_level.min(TOP) {
-            let is_split = |cell: Key| level + 1 < max_level && split(cell);
-            subtrees = subtrees.into_iter().flat_map(|cell| tree.fill(cell, &is_split, &record)).collect();
+        let grower = Grower { max_level, split: &split, record: &record };
+        let (name, place) = Key::ROOT.block();
+        tree.put_block(name, Block { refined: Cells::one(place), ..Block::EMPTY });
+        let first = grower.block(Key::ROOT.child(Corner::MIN), Cells::of_level(1), &mut Vec::new());
+        let mut regions = vec![Region { cell: Key::ROOT, refined: first.1.refined.byte(0) }];
+        tree.put_block(first.0, first.1);
+        for _ in 0..TOP {
+            let mut below = Vec::new();
+            regions.into_iter().for_each(|region| grower.below(&mut tree, &region, &mut Vec::new(), &mut below));
+            regions = below;
         }
-        let grow = |(): &mut (), n: usize| {
+        let grow = |scratch: &mut Vec<T>, n: usize| {
             let mut subtree = LinearOctree::new();
-            subtree.grow(subtrees[n], max_level, &split, &record);
+            let mut waiting = Vec::new();
+            grower.below(&mut subtree, &regions[n], scratch, &mut waiting);
+            while let Some(region) = waiting.pop() {
+                grower.below(&mut subtree, &region, scratch, &mut waiting);
+            }
             subtree
         };
         let append = |subtree| {
             tree.append(subtree);
             Ok(())
         };
-        in_order(subtrees.len(), &Silent, || (), grow, append).expect("nothing fails or is cancelled");
+        in_order(regions.len(), &Silent, Vec::new, grow, append).expect("nothing fails or is cancelled");
         tree
     }
+}
 
-    /// All below a cell that is split.
-    fn grow(&mut self, cell: Key, max_level: u32, split: &impl Fn(Key) -> bool, record: &impl Fn(Key) -> T) {
-        let below = cell.level().unwrap_or(MAX_LEVEL) + 1;
-        let is_split = |cell: Key| below < max_level && split(cell);
-        for child in self.fill(cell, &is_split, record) {
-            self.grow(child, max_level, split, record);
+/// What a tree is built by.
+struct Grower<'a, S, R> {
+    max_level: u32,
+    split: &'a S,
+    record: &'a R,
+}
+
+impl<S: Fn(Key) -> bool, R> Grower<'_, S, R> {
+    /// The block with the grandchildren of a region; lists those of its children that have refined children in turn.
+    fn below<T>(&self, tree: &mut LinearOctree<T>, region: &Region, scratch: &mut Vec<T>, regions: &mut Vec<Region>)
+    where
+        R: Fn(Key) -> T,
+    {
+        if region.refined == 0 {
+            return;
         }
+        let children = Bits(u64::from(region.refined));
+        let cells = children.clone().fold(Cells::EMPTY, |cells, child| cells | Cells::family(8 * child));
+        let (name, block) = self.block(region.cell.child(Corner::MIN).child(Corner::MIN), cells, scratch);
+        let inside = children.map(|child| Region {
+            cell: region.cell.child(Corner::ALL[child as usize]),
+            refined: block.refined.byte(8 * child),
+        });
+        regions.extend(inside.filter(|inside| inside.refined != 0));
+        tree.put_block(name, block);
+    }
+
+    /// Some cells of a block, each split or a leaf. `scratch` is empty before and after.
+    fn block<T>(&self, name: Key, cells: Cells, scratch: &mut Vec<T>) -> (Key, Block<T>)
+    where
+        R: Fn(Key) -> T,
+    {
+        let (mut leaves, mut refined) = (Cells::EMPTY, Cells::EMPTY);
+        let may_split = name.level() < Some(self.max_level);
+        for place in cells.places() {
+            let cell = name.in_block(place);
+            if may_split && (self.split)(cell) {
+                refined |= Cells::one(place);
+            } else {
+                leaves |= Cells::one(place);
+                scratch.push((self.record)(cell));
+            }
+        }
+        let mut records = Vec::with_capacity(scratch.len());
+        records.append(scratch);
+        (name, Block { leaves, refined, records })
     }
 }
 
 impl<T> LinearOctree<T> {
-    /// Marks the root as refined.
-    fn refine_root(&mut self) {
-        let (name, place) = Key::ROOT.block();
-        self.blocks.entry(name).or_insert(Block::EMPTY).refined |= Cells::one(place);
-    }
-
-    /// Makes the children of a cell that is marked as refined: leaves, or marked as refined and returned. One probe.
-    fn fill(
-        &mut self,
-        cell: Key,
-        is_split: &impl Fn(Key) -> bool,
-        record: &impl Fn(Key) -> T,
-    ) -> Parts {
-        let children = cell.children();
-        let (name, place) = children[0].block();
-        let refined = children.iter().enumerate().filter(|&(_, &child)| is_split(child)).fold(0, |bits, (i, _)| bits | 1 << i);
-        let block = self.blocks.entry(name).or_insert(Block::EMPTY);
-        let leaves = 8 - (refined as u8).count_ones() as usize;
-        self.room += block.make_room(leaves);
-        for (i, &child) in (0..).zip(&children).filter(|(i, _)| refined >> i & 1 == 0) {
-            block.add(place + i, record(child));
-        }
-        block.refined |= Cells(refined << place);
-        self.levels.add(children[0], leaves);
-        Parts { cell, refined: Bits(refined) }
+    /// Puts a block where none is.
+    fn put_block(&mut self, name: Key, block: Block<T>) {
+        self.levels.add(name, block.leaves.count());
+        self.room += block.records.capacity();
+        self.blocks.insert(name, block);
     }
 
     /// Takes over the leaves of another tree, without looking whether they overlap those of this one. Of a leaf that is in both, the
     /// record of the other stays. O(blocks) where the trees share none.
     pub fn append(&mut self, other: Self) {
+        self.blocks.reserve(other.blocks.len());
         for (name, block) in other.blocks {
             match self.blocks.entry(name) {
                 Entry::Vacant(slot) => {
@@ -162,20 +198,6 @@ impl LinearOctree<Range<u32>> {
         };
         let tree = LinearOctree::build(max_level, split, record);
         (tree, coded.into_iter().map(|(_, i)| i).collect())
-    }
-}
-
-/// Some children of a cell.
-struct Parts {
-    cell: Key,
-    refined: Bits,
-}
-
-impl Iterator for Parts {
-    type Item = Key;
-
-    fn next(&mut self) -> Option<Key> {
-        self.refined.next().map(|i| self.cell.child(Corner::ALL[i as usize]))
     }
 }
 

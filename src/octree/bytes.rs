@@ -72,15 +72,21 @@ impl<T> LinearOctree<T> {
         let fail = |rest: &[u8], problem: String, remedy: &str| {
             Error::format(name, Place::Byte((bytes.len() - rest.len()) as u64), problem, remedy)
         };
-        let cut = |rest: &[u8]| fail(rest, "the octree ends early".to_owned(), "it was not written or copied to its end");
+        let cut =
+            |rest: &[u8]| fail(rest, "the octree ends early".to_owned(), "it was not written or copied to its end");
         if rest.split_off(..4) != Some(MAGIC) {
             return Err(fail(bytes, "this is no octree: it does not start with ZOCT".to_owned(), ""));
         }
         let version = *rest.split_off_first().ok_or_else(|| cut(rest))?;
         if version != VERSION {
-            return Err(fail(rest, format!("version {version} of the format is not known"), "take a newer zmend to read it"));
+            return Err(fail(
+                rest,
+                format!("version {version} of the format is not known"),
+                "take a newer zmend to read it",
+            ));
         }
-        let count = rest.split_off(..8).and_then(|n| n.try_into().ok()).map(u64::from_le_bytes).ok_or_else(|| cut(rest))?;
+        let count =
+            rest.split_off(..8).and_then(|n| n.try_into().ok()).map(u64::from_le_bytes).ok_or_else(|| cut(rest))?;
         let mut tree = LinearOctree::new();
         let (mut end, mut before) = (0u64, 0);
         for _ in 0..count {

@@ -8,9 +8,9 @@
 //!
 //! # Cost
 //!
-//! O(leaves); a probe for each refined cell on each side of each element, in blocks that are at hand.
+//! O(leaves), seven elements a leaf: three faces, three edges, a point. A probe for each refined cell on each side of each element.
 
-use super::{CellState, LinearOctree};
+use super::{Block, CellState, LinearOctree};
 use crate::grid::{Axis, Corner, Extent, Key};
 use rayon::prelude::*;
 
@@ -27,7 +27,11 @@ pub struct Dual<'a, T> {
 impl<T> Dual<'_, T> {
     /// The element's name: that of a corner, an edge or a face of the smallest leaf.
     pub fn element(&self) -> Key {
-        let (corner, leaf) = Corner::ALL.into_iter().map(|c| (c, self.leaves[c.index()].0)).min_by_key(|&(_, l)| l.size()).expect("eight");
+        let (corner, leaf) = Corner::ALL
+            .into_iter()
+            .map(|c| (c, self.leaves[c.index()].0))
+            .min_by_key(|&(_, l)| l.size())
+            .expect("eight");
         let half = leaf.size() / 2;
         let centre = Axis::ALL.map(|a| {
             let c = leaf.center()[a.index()];
@@ -49,8 +53,57 @@ pub struct DualPiece<'a, T> {
     sides: [Side<'a, T>; 8],
 }
 
-/// A cell on a side: refined, or a leaf with its record.
-type Side<'a, T> = (Key, Option<&'a T>);
+/// A cell on a side.
+#[derive(Debug)]
+struct Side<'a, T> {
+    cell: Key,
+    what: What<'a, T>,
+}
+
+/// What there is of a cell on a side.
+#[derive(Debug)]
+enum What<'a, T> {
+    Leaf(&'a T),
+    /// The block with its children, and the place of the first.
+    Refined(&'a Block<T>, u32),
+}
+
+impl<T> Clone for Side<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Side<'_, T> {}
+
+impl<T> Clone for What<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for What<'_, T> {}
+
+impl<'a, T> Side<'a, T> {
+    fn leaf(&self) -> Option<(Key, &'a T)> {
+        match self.what {
+            What::Leaf(record) => Some((self.cell, record)),
+            What::Refined(..) => None,
+        }
+    }
+
+    /// The child at a corner, if there is one; a leaf is its own.
+    fn child(self, tree: &'a LinearOctree<T>, corner: Corner) -> Option<Self> {
+        let What::Refined(block, first) = self.what else { return Some(self) };
+        let place = first + corner.index() as u32;
+        let cell = self.cell.child(corner);
+        match block.get(place) {
+            Some(record) => Some(Side { cell, what: What::Leaf(record) }),
+            None if block.refined.has(place) => tree.refined_side(cell),
+            None => None,
+        }
+    }
+}
 
 impl<T> LinearOctree<T> {
     /// Calls `visit` with every point, edge and face inside the root at which leaves meet, each once. What lies on the root's boundary
@@ -91,7 +144,11 @@ impl<T> LinearOctree<T> {
         while pieces.len() < count && pieces.iter().any(|piece| !piece.is_least()) {
             let divide = |piece: DualPiece<'a, T>| {
                 let mut parts = Vec::new();
-                if piece.is_least() { parts.push(piece) } else { piece.for_each_part(|part| parts.push(part)) }
+                if piece.is_least() {
+                    parts.push(piece)
+                } else {
+                    piece.for_each_part(|part| parts.push(part))
+                }
                 parts
             };
             pieces = pieces.into_iter().flat_map(divide).collect();
@@ -100,15 +157,17 @@ impl<T> LinearOctree<T> {
     }
 
     fn whole_dual(&self) -> Option<DualPiece<'_, T>> {
-        Some(DualPiece { tree: self, extent: Extent::CELL, sides: [self.side(Key::ROOT)?; 8] })
+        let root = match self.state(Key::ROOT) {
+            CellState::Leaf(record) => Side { cell: Key::ROOT, what: What::Leaf(record) },
+            CellState::Refined => self.refined_side(Key::ROOT)?,
+            CellState::Absent => return None,
+        };
+        Some(DualPiece { tree: self, extent: Extent::CELL, sides: [root; 8] })
     }
 
-    fn side(&self, cell: Key) -> Option<Side<'_, T>> {
-        match self.state(cell) {
-            CellState::Leaf(record) => Some((cell, Some(record))),
-            CellState::Refined => Some((cell, None)),
-            CellState::Absent => None,
-        }
+    fn refined_side(&self, cell: Key) -> Option<Side<'_, T>> {
+        let (block, first) = self.block_of(cell.child(Corner::MIN))?;
+        Some(Side { cell, what: What::Refined(block, first) })
     }
 }
 
@@ -129,10 +188,9 @@ impl<T: Sync> LinearOctree<T> {
 impl<'a, T> DualPiece<'a, T> {
     /// Calls `visit` with every element of this piece.
     pub fn visit(&self, visit: &mut impl FnMut(Dual<'a, T>)) {
-        let [a, b, c, d, e, f, g, h] = self.sides.map(|(leaf, record)| Some((leaf, record?)));
-        if let (Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g), Some(h)) = (a, b, c, d, e, f, g, h) {
+        if let Some(leaves) = all(self.sides.map(|side| side.leaf())) {
             if self.extent != Extent::CELL {
-                visit(Dual { extent: self.extent, leaves: [a, b, c, d, e, f, g, h] });
+                visit(Dual { extent: self.extent, leaves });
             }
         } else {
             self.for_each_part(|part| part.visit(visit));
@@ -141,46 +199,59 @@ impl<'a, T> DualPiece<'a, T> {
 
     /// Whether all sides are leaves.
     fn is_least(&self) -> bool {
-        self.sides.iter().all(|side| side.1.is_some())
+        self.sides.iter().all(|side| side.leaf().is_some())
     }
 
     /// The sub-elements with leaves on all sides: by what is taken along x, then y, then z: the low half, the middle, the high half.
     fn for_each_part(&self, mut take: impl FnMut(DualPiece<'a, T>)) {
-        // Each side's children, by corner; a leaf is its own.
-        let mut children = [[None; 8]; 8];
-        for corner in Corner::ALL {
-            let same = usize::from(corner.bits() & !self.extent.bits());
-            children[corner.index()] = if same < corner.index() {
-                children[same]
-            } else {
-                let (cell, record) = self.sides[corner.index()];
-                match record {
-                    Some(_) => [Some((cell, record)); 8],
-                    None => cell.children().map(|child| self.tree.side(child)),
-                }
-            };
-        }
-        for part in 0..27u8 {
-            let choice = [part / 9, part / 3 % 3, part % 3];
-            // Halves can be taken, or have to be, along the extent only.
-            if Axis::ALL.into_iter().any(|a| !self.extent.contains(a) && choice[a.index()] != 1) {
-                continue;
-            }
-            let halved = Axis::ALL.into_iter().filter(|a| choice[a.index()] != 1);
-            let extent = halved.fold(Extent::POINT, Extent::with);
-            let high = Axis::ALL.into_iter().filter(|a| choice[a.index()] == 2).fold(0, |bits, a| bits | a.bit());
-            let side = |corner: Corner| {
-                // Towards the element from beside it; away from the middle; or in the half.
-                let towards = !corner.bits() & !self.extent.bits();
-                let away = corner.bits() & self.extent.bits() & !extent.bits();
-                children[corner.index()][usize::from((towards | away | high) & 7)]
-            };
-            let [a, b, c, d, e, f, g, h] = Corner::ALL.map(side);
-            if let (Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g), Some(h)) = (a, b, c, d, e, f, g, h) {
-                take(DualPiece { tree: self.tree, extent, sides: [a, b, c, d, e, f, g, h] });
+        let across = !self.extent.bits() & 7;
+        // Eight children touch the element, whatever its kind: by side across it and by half along it.
+        let children = Corner::ALL.map(|corner| {
+            let side = self.sides[corner.index()];
+            side.child(self.tree, Corner::ALL[usize::from(corner.bits() ^ across)])
+        });
+        for part in PARTS.iter().filter(|part| part.0 & across == 0) {
+            let &(halved, high) = part;
+            // Along the axes of a half all sides lie in it.
+            let side = |corner: Corner| children[usize::from(corner.bits() & !halved | high)];
+            if let Some(sides) = all(Corner::ALL.map(side)) {
+                take(DualPiece { tree: self.tree, extent: Extent::ALL[usize::from(halved)], sides });
             }
         }
     }
+}
+
+/// Parts of an element: the axes along which it is halved, and those of them on which the high half is taken. Ordered by what is taken
+/// along x, then y, then z: the low half, the middle, the high half.
+const PARTS: [(u8, u8); 27] = {
+    let mut parts = [(0, 0); 27];
+    let mut n = 0;
+    while n < 27 {
+        let choice = [n / 9, n / 3 % 3, n % 3];
+        let mut a = 0;
+        while a < 3 {
+            let bit = Axis::ALL[a].bit();
+            if choice[a] != 1 {
+                parts[n].0 |= bit;
+            }
+            if choice[a] == 2 {
+                parts[n].1 |= bit;
+            }
+            a += 1;
+        }
+        n += 1;
+    }
+    parts
+};
+
+/// All eight, if all are there.
+fn all<S: Copy>(sides: [Option<S>; 8]) -> Option<[S; 8]> {
+    let first = sides[0]?;
+    let mut found = [first; 8];
+    for (found, side) in found.iter_mut().zip(sides) {
+        *found = side?;
+    }
+    Some(found)
 }
 
 #[cfg(test)]

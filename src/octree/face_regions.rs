@@ -40,7 +40,9 @@ impl<T> LinearOctree<T> {
                     }
                     // Of two leaves the smaller joins, of two alike the one below.
                     let joins = |size: u32| size > leaf.size() || size == leaf.size() && face.is_high();
-                    if let Some((_, &other)) = numbers.neighbours(leaf, face).next().filter(|(other, _)| joins(other.size())) {
+                    if let Some((_, &other)) =
+                        numbers.neighbours(leaf, face).next().filter(|(other, _)| joins(other.size()))
+                    {
                         sets.union(number, other);
                     }
                 }

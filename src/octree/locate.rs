@@ -7,8 +7,8 @@ use crate::grid::key::{MAX_LEVEL, SIDE, interleave};
 /// Leaf search.
 ///
 /// A probe tells of a cell whether it is a leaf, has leaves inside, or lies in a larger leaf or nowhere. So the level of the leaf at a
-/// point is found by bisection of the levels that HAVE leaves: at most 5 probes, and those of coarse levels hit few blocks, which are
-/// in the cache.
+/// point is found by bisection of the levels that HAVE leaves, after a look at the finest, where most leaves are: at most 6 probes, and
+/// those of coarse levels hit few blocks, which are in the cache.
 impl<T> LinearOctree<T> {
     /// The leaf that holds a point given in lattice coordinates, 0 ..= 2^19, with its record.
     ///
@@ -26,7 +26,7 @@ impl<T> LinearOctree<T> {
     /// ```
     pub fn locate(&self, point: [u32; 3]) -> Option<(Key, &T)> {
         let levels = self.levels.occupied;
-        self.search(code_of(point)?, levels, middle(levels)?)
+        self.search(code_of(point)?, levels, levels.checked_ilog2()?)
     }
 
     /// As [`locate`](LinearOctree::locate), for a point whose leaf is likely of about the size of the cell `hint`, such
@@ -44,9 +44,9 @@ impl<T> LinearOctree<T> {
     }
 
     /// The leaf around an interleaved point of the half-open root, among those of `levels`; `level` is the most likely. Looks there,
-    /// then at the next level in the direction the answer gives, then bisects.
+    /// then bisects; but where it is not the finest, at the next level in the direction the answer gives first.
     pub(super) fn search(&self, code: u64, mut levels: u32, mut level: u32) -> Option<(Key, &T)> {
-        let mut is_first = true;
+        let mut is_first = levels >> level > 1;
         loop {
             let cell = Key::around(code, level);
             let finer = match self.state(cell) {

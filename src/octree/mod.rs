@@ -32,8 +32,8 @@
 mod balance;
 mod blocks;
 mod build;
-pub(crate) mod cells;
 mod bytes;
+pub(crate) mod cells;
 pub mod compact;
 pub mod components;
 pub mod crossings;

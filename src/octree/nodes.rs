@@ -264,7 +264,8 @@ fn places<V: Value>(nodes: &Nodes<V>, leaf: Key) -> Option<[V; 27]> {
             // Nothing hangs in the middle of a leaf.
             let hanging = if dimension < 3 { node(n as u32) } else { None };
             places[n] = hanging.unwrap_or_else(|| {
-                let ends = axes.axes().flat_map(|a| [n - STRIDE[a.index()], n + STRIDE[a.index()]]).map(|end| places[end]);
+                let ends =
+                    axes.axes().flat_map(|a| [n - STRIDE[a.index()], n + STRIDE[a.index()]]).map(|end| places[end]);
                 ends.reduce(|a, b| a + b).expect("a middle has ends") * (0.5 / f64::from(dimension))
             });
         }
@@ -300,7 +301,8 @@ fn split_nodes<V: Value>(nodes: &mut Nodes<V>, child: Key) {
     if child.corner_in_parent() == Corner::MIN {
         let (min, half) = (parent.min_corner(), child.size());
         let places = places(nodes, parent).expect("the corners of a leaf are nodes");
-        for (n, (axes, value)) in (0u32..).zip(MIDDLES.iter().zip(places)).filter(|(_, (axes, _))| axes.dimension() > 0) {
+        for (n, (axes, value)) in (0u32..).zip(MIDDLES.iter().zip(places)).filter(|(_, (axes, _))| axes.dimension() > 0)
+        {
             let steps = [n / 9, n / 3 % 3, n % 3];
             let point = Key::point([0, 1, 2].map(|i| min[i] + steps[i] * half)).expect("in the root");
             // Two children at an edge's middle, four at a face's, eight at the centre.
@@ -452,7 +454,9 @@ mod tests {
         Key::ROOT.children()[1..].iter().for_each(|&child| assert!(field.remove(child).is_some()));
         let middle = f64::from(SIDE / 2);
         assert_eq!(field.value_at([middle; 3]), field.value(Key::point([SIDE / 2; 3]).expect("inside")));
-        assert!(field.value_at([5.0, middle, middle]).is_some() && field.value_at([5.0, middle + 0.5, middle]).is_none());
+        assert!(
+            field.value_at([5.0, middle, middle]).is_some() && field.value_at([5.0, middle + 0.5, middle]).is_none()
+        );
         field.remove(Key::ROOT.children()[0]);
         assert_eq!((field.value_at([5.0; 3]), field.is_empty(), field.len()), (None, true, 0));
     }

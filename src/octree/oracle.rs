@@ -65,7 +65,8 @@ impl Oracle {
     pub(super) fn around(&self, element: Key) -> Vec<Key> {
         let shares = |b: Span| {
             let (min, max) = meet(b, span(element));
-            meets((min, max)) && Axis::ALL.into_iter().all(|a| !element.dir().contains(a) || min[a.index()] < max[a.index()])
+            meets((min, max))
+                && Axis::ALL.into_iter().all(|a| !element.dir().contains(a) || min[a.index()] < max[a.index()])
         };
         self.0.iter().filter(|&&(_, b)| shares(b)).map(|&(leaf, _)| leaf).collect()
     }

@@ -192,7 +192,8 @@ fn stretch(cell: Key, origin: [f64; 3], direction: [f64; 3]) -> Option<(f64, f64
 
 /// The finest cell that holds what is next to a point on the side of a corner.
 fn finest_beside(point: [u32; 3], corner: Corner) -> Option<Key> {
-    let [x, y, z] = Axis::ALL.map(|a| if corner & a { Some(point[a.index()]) } else { point[a.index()].checked_sub(1) });
+    let [x, y, z] =
+        Axis::ALL.map(|a| if corner & a { Some(point[a.index()]) } else { point[a.index()].checked_sub(1) });
     Key::holding([x?, y?, z?], MAX_LEVEL)
 }
 

@@ -74,9 +74,10 @@ impl<T> LinearOctree<T> {
             return Err(Violation::Mark { cell });
         }
         // A leaf with leaves inside is refined, too.
-        let overlaps = self.blocks.iter().flat_map(|(&name, block)| {
-            (block.leaves & block.refined).places().map(move |place| name.in_block(place))
-        });
+        let overlaps = self
+            .blocks
+            .iter()
+            .flat_map(|(&name, block)| (block.leaves & block.refined).places().map(move |place| name.in_block(place)));
         let inner = overlaps.filter_map(|outer| {
             let first = |corner| self.leaves_in(outer.child(corner)).next().map(|(leaf, _)| (leaf, outer));
             Corner::ALL.into_iter().filter_map(first).min()
@@ -96,11 +97,12 @@ impl<T> LinearOctree<T> {
             let first = (cell.level() < Some(MAX_LEVEL)).then(|| self.block_of(cell.child(Corner::MIN)))??;
             Some(first.0.nodes().byte(first.1) != 0)
         };
-        let idle = block.refined.places().map(|place| name.in_block(place)).find(|&cell| has_children(cell) != Some(true));
+        let idle =
+            block.refined.places().map(|place| name.in_block(place)).find(|&cell| has_children(cell) != Some(true));
         let families = (0..64).step_by(8).filter(|&place| block.nodes().byte(place) != 0);
-        let unmarked = families.filter_map(|place| name.in_block(place).parent()).find(|&parent| {
-            !self.block_of(parent).is_some_and(|(above, place)| above.refined.has(place))
-        });
+        let unmarked = families
+            .filter_map(|place| name.in_block(place).parent())
+            .find(|&parent| !self.block_of(parent).is_some_and(|(above, place)| above.refined.has(place)));
         idle.into_iter().chain(unmarked).min()
     }
 }
