@@ -28,7 +28,7 @@ impl Cells {
 
     /// The cell and its seven siblings.
     pub(crate) const fn family(place: u32) -> Cells {
-        Cells(0xff << (place & 56))
+        Cells(0xff << (place & 0o70))
     }
 
     /// Those cells of a block of `level` that lie in the root: all 64 but on the first two levels.
@@ -60,7 +60,7 @@ impl Cells {
 
     /// The eight bits of the family at a place, bit 0 for the child at corner 0.
     pub(crate) const fn byte(self, place: u32) -> u8 {
-        (self.0 >> (place & 56)) as u8
+        (self.0 >> (place & 0o70)) as u8
     }
 
     /// The neighbours across `face`: those in this block, and those in the next.

@@ -16,7 +16,7 @@
 use super::{Balance, CellState, LinearOctree, SEEDS};
 use crate::grid::block::{Cells, block_beside};
 use crate::grid::key::MAX_LEVEL;
-use crate::grid::{Axis, Corner, Direction, Face, Key};
+use crate::grid::{Corner, Direction, Face, Key};
 use ahash::RandomState;
 use hashbrown::HashMap;
 use rayon::prelude::*;

@@ -145,9 +145,9 @@ impl<T> LinearOctree<T> {
             let divide = |piece: DualPiece<'a, T>| {
                 let mut parts = Vec::new();
                 if piece.is_least() {
-                    parts.push(piece)
+                    parts.push(piece);
                 } else {
-                    piece.for_each_part(|part| parts.push(part))
+                    piece.for_each_part(|part| parts.push(part));
                 }
                 parts
             };

@@ -7,8 +7,8 @@ impl Key {
     /// The first cell of its block, which names it, and its place there, 0 ..= 63.
     pub(crate) const fn block(self) -> (Key, u32) {
         let shift = self.0.trailing_zeros() + 3;
-        let place = (self.0 & CODE) >> shift & 63;
-        (Key(self.0 & !(63 << shift) | CELL), place as u32)
+        let place = (self.0 & CODE) >> shift & 0o77;
+        (Key(self.0 & !(0o77 << shift) | CELL), place as u32)
     }
 
     /// The cell at a place of the block that `self` names.
