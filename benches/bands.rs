@@ -29,7 +29,7 @@ fn bands(c: &mut Criterion) {
         group.throughput(Throughput::Elements(octree.crossings().len() as u64)).sample_size(10);
         group.bench_function("parity", |b| b.iter(|| signed(black_box(&mut mesh))));
         group.bench_function("components", |b| b.iter(|| Components::new(black_box(&octree)).list().len()));
-        group.bench_function("hull", |b| b.iter(|| hull(black_box(&hits))));
+        group.bench_function("hull", |b| b.iter(|| hull(black_box(&hits), &Silent)));
         for cells in [2.0, 6.0] {
             group.bench_function(format!("band-{cells}"), |b| {
                 b.iter(|| Band::around(black_box(&mut mesh), &frame, cells, &Silent).expect("in memory"));

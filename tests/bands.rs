@@ -328,7 +328,7 @@ proptest! {
     fn the_hull_is_what_a_dense_flood_leaves(mut mesh in soups(), depth in 4u32..6) {
         let frame = Frame::new(DVec3::ZERO, 32.0, depth).expect("a frame");
         let scan = scan_oriented(&mut mesh, &frame, true, &Silent).expect("in memory");
-        let octree: SignedOctree = hull(&scan.hits);
+        let octree: SignedOctree = hull(&scan.hits, &Silent).expect("in memory");
         prop_assert_eq!(octree.validate(), Ok(()));
         let side = 1usize << depth;
         let closed = |p: [u32; 3], axis: usize| {
@@ -347,7 +347,7 @@ proptest! {
         let depth = 5;
         let frame = Frame::new(DVec3::splat(-16.0), 64.0, depth + 1).expect("a frame");
         let scan = scan_oriented(&mut mesh, &frame, true, &Silent).expect("in memory");
-        let plain = hull(&scan.hits);
+        let plain = hull(&scan.hits, &Silent).expect("in memory");
         let closed = hull_with_gap(&scan.hits, &mut mesh, &frame, gap, &Silent).expect("in memory");
         prop_assert_eq!(closed.validate(), Ok(()));
         let bounds = mesh.bounds().expect("in memory");

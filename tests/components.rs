@@ -202,7 +202,7 @@ proptest! {
         sizes.sort_unstable_by(|a, b| b.cmp(a));
         let number = dense.components();
         for choice in [Keep::All, Keep::Largest, Keep::Count(count), Keep::Ratio(ratio)] {
-            let (after, kept) = keep(octree.clone(), choice, drop_cavities).expect("in range");
+            let (after, kept) = keep(octree.clone(), choice, drop_cavities, &Silent).expect("in range");
             prop_assert_eq!(after.validate(), Ok(()));
             let least = match choice {
                 Keep::All => 0,
@@ -244,10 +244,10 @@ fn a_ball_in_a_hollow_ball_is_two_solids() {
     let mut by_kind = BTreeMap::new();
     Components::new(&octree).list().iter().for_each(|c| *by_kind.entry(c.is_inside).or_insert(0) += 1);
     assert_eq!(by_kind, [(false, 2), (true, 2)].into());
-    let (largest, kept) = keep(octree.clone(), Keep::Largest, false).expect("in range");
+    let (largest, kept) = keep(octree.clone(), Keep::Largest, false, &Silent).expect("in range");
     assert_eq!((kept.solids, kept.dropped_solids, kept.cavities, kept.filled_cavities), (2, 1, 1, 0));
     assert_eq!(check(&surfaces(&largest)[0]).expect("a hollow ball").components, 2);
-    let (full, kept) = keep(octree, Keep::Largest, true).expect("in range");
+    let (full, kept) = keep(octree, Keep::Largest, true, &Silent).expect("in range");
     assert_eq!((kept.filled_cavities, Dense::new(|p| full.is_inside(p))), (1, Dense::new(|p| square(p) <= 196)));
 }
 
@@ -255,7 +255,7 @@ fn a_ball_in_a_hollow_ball_is_two_solids() {
 fn choices_that_keep_nothing_are_refused() {
     let octree = Dense::new(|_| false).octree();
     for bad in [Keep::Ratio(1.5), Keep::Ratio(-0.1), Keep::Ratio(f64::NAN), Keep::Count(0)] {
-        assert!(keep(octree.clone(), bad, false).unwrap_err().to_string().contains("largest"), "{bad:?}");
+        assert!(keep(octree.clone(), bad, false, &Silent).unwrap_err().to_string().contains("largest"), "{bad:?}");
     }
-    assert_eq!(keep(octree, Keep::Largest, true).expect("in range").1.solids, 0);
+    assert_eq!(keep(octree, Keep::Largest, true, &Silent).expect("in range").1.solids, 0);
 }

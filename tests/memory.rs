@@ -50,6 +50,13 @@ fn the_peak_stays_below_the_limit() {
         ("repair scan.ply a.ply -d 9 -s quads", 20),
         ("repair cube.ply a.stl -d 10", 60),
         ("repair cube.ply a.ply -d 10 -s dc", 40),
+        ("repair cube.ply a.ply -d 9 --inside hull", 36),
+        ("repair scan.ply a.ply -d 8 --inside hull --gap 0.05", 58),
+        ("repair scan.ply a.ply -d 8 --thicken 0.05 --thicken-what all", 36),
+        ("repair scan.ply a.ply -d 9 --thicken 0.05", 28),
+        ("repair knot-holes.ply a.ply -d 9 --keep largest --drop-cavities", 24),
+        ("repair knot-holes.ply a.ply -d 9 --cut 0.01", 36),
+        ("repair scan.ply a.ply -d 9 --fill 0.01", 64),
     ] {
         let mut limit = least * 1_000_000u64;
         let mut refusals = 0;

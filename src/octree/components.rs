@@ -12,7 +12,7 @@
 
 use super::cells::Cells;
 use super::crossings::{Brick, Builder, Crossings, finest_element, owner};
-use super::regions::Regions;
+use super::regions::{REGION_BYTES, Regions};
 use super::signed::SignedOctree;
 use crate::grid::brick::Plane;
 use crate::grid::{Axis, Extent, Face, Key};
@@ -28,6 +28,11 @@ pub struct Component {
     pub edges: u64,
     /// Lattice points in it: the volume in cells, as near as whole cells tell. 0 for the outer space.
     pub points: u64,
+}
+
+/// Bytes held while the components of an octree are found and some of them dropped: the octree and what is made of it included.
+pub fn component_bytes(octree: &SignedOctree) -> usize {
+    2 * octree.bytes() + octree.crossings().bricks().len() * (REGION_BYTES + size_of::<[Plane; 3]>())
 }
 
 /// The components of the inside and the outside. Number 0 is the outer space.

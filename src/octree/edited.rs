@@ -89,6 +89,11 @@ impl EditedOctree {
         !(self.removed.is_empty() && self.added.is_empty())
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.signed.bytes() + (self.removed.capacity() + self.added.capacity()) * size_of::<Key>()
+    }
+
     /// Whether a finest element belongs to the solid. Cost: two binary searches and up to eight questions for a sign.
     pub fn contains(&self, element: Key) -> bool {
         self.added.binary_search(&element).is_ok()

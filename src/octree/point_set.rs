@@ -20,6 +20,16 @@ impl PointSet {
         PointSet { depth, planes }
     }
 
+    /// How many bricks have points of the set.
+    pub(crate) fn bricks(&self) -> usize {
+        self.planes.len()
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.planes.allocated_bytes()
+    }
+
     /// Whether a point is in the set; none outside of the root is. Cost: a hash probe.
     pub(crate) fn contains(&self, at: [u32; 3]) -> bool {
         let key = Key::cell(self.depth - 3, at.map(|c| c >> 3));

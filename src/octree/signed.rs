@@ -1,7 +1,7 @@
 //! Inside and outside at every lattice point: what repair, topology and contouring meet in.
 
 use super::cells::Cells;
-use super::crossings::{Builder, Crossings, Sample, finest_element, lattice_point, position, toward};
+use super::crossings::{Brick, Builder, Crossings, Sample, finest_element, lattice_point, position, toward};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
 use crate::parallel::{in_order, pieces};
@@ -11,6 +11,10 @@ use std::ops::Range;
 
 /// Bytes a brick that [`SignedOctree::from_crossings`] takes beyond the crossings: the signs, and the bricks by row.
 pub const SIGN_BYTES: usize = size_of::<Plane>() + size_of::<(u64, u32)>();
+
+/// Bytes for each brick that is given to [`SignedOctree::from_signs`], the octree that is made of it included, but for crossings.
+pub const GIVEN_BYTES: usize =
+    size_of::<(Key, Plane)>() + 2 * size_of::<(Key, u32)>() + size_of::<Brick>() + SIGN_BYTES;
 
 /// Crossed edges together with the signs of the lattice points.
 ///

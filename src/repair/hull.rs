@@ -22,7 +22,7 @@ pub(super) fn tell(
     progress.begin(Stage::Sign, 0);
     let octree = clock.time(Stage::Sign, || match options.gap {
         Some(gap) => hull_with_gap(&scan.hits, source, frame, gap, progress),
-        None => Ok(hull(&scan.hits)),
+        None => hull(&scan.hits, progress),
     })?;
     let choice = InsideChoice { rule: Inside::Hull, reason: Reason::Asked, reversed: false };
     let vanished = vanished(&scan.hits, &octree);

@@ -134,7 +134,7 @@ fn mend(
     if let Some(width) = options.thicken {
         octree = clock.time(Stage::Sign, || thicken(&octree, source, &frame, width, options.thicken_what, progress))?;
     }
-    let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities))?;
+    let (octree, kept) = clock.time(Stage::Sign, || keep(octree, options.keep, options.drop_cavities, progress))?;
     let mut solid = Solid::new(octree, frame);
     let mut topology = None;
     if !options.topology.is_nothing() {

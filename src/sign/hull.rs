@@ -22,7 +22,7 @@
 //!
 //! That of [`Regions`] without gaps. With them, that of two bands of r cells: memory and time grow with the surface times r.
 
-use super::band::Band;
+use super::band::{Band, seed_bytes};
 use super::thicken::{check_gap, clipped, for_crossed, sample};
 use crate::error::Result;
 use crate::geom::Frame;
@@ -32,16 +32,20 @@ use crate::mesh::TriangleSource;
 use crate::octree::LinearOctree;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::{EdgeHit, OrientedHits};
-use crate::octree::regions::{ClosedEdges, Regions};
-use crate::octree::signed::SignedOctree;
-use crate::progress::Progress;
+use crate::octree::regions::{ClosedEdges, REGION_BYTES, Regions};
+use crate::octree::signed::{GIVEN_BYTES, SignedOctree};
+use crate::progress::{Beside, Progress};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::iter::Peekable;
 
 /// What infinity cannot reach without passing through a face.
-pub fn hull(hits: &OrientedHits) -> SignedOctree {
+///
+/// # Errors
+/// `Memory` when `progress` says so.
+pub fn hull(hits: &OrientedHits, progress: &dyn Progress) -> Result<SignedOctree> {
     let edges = hits.edges();
+    progress.hold((2 * hits.bytes() + edges.bricks().len() * (REGION_BYTES + GIVEN_BYTES)) as u64)?;
     let regions = Regions::new(edges);
     let signs: Vec<(Key, Plane)> = (0..edges.bricks().len())
         .into_par_iter()
@@ -56,7 +60,7 @@ pub fn hull(hits: &OrientedHits) -> SignedOctree {
         });
     };
     let uniform = |key| regions.of_absent(key) != 0;
-    SignedOctree::from_signs(edges.depth(), edges.with_normals(), &signs, uniform, samples)
+    Ok(SignedOctree::from_signs(edges.depth(), edges.with_normals(), &signs, uniform, samples))
 }
 
 /// Of the hits of an edge, the one that is nearest to its outer end.
@@ -74,7 +78,7 @@ fn tolerance(radius: f64) -> f64 {
 /// As [`hull`], after gaps between faces up to a width of `gap` model units are closed. `hits` are those of the same source and frame.
 ///
 /// # Errors
-/// When the gap is above 120 cells or below 0.6; whatever the source returns; and `Cancelled`.
+/// When the gap is above 120 cells or below 0.6; whatever the source returns; `Cancelled`, and `Memory` when `progress` says so.
 pub fn hull_with_gap(
     hits: &OrientedHits,
     source: &mut dyn TriangleSource,
@@ -84,7 +88,11 @@ pub fn hull_with_gap(
 ) -> Result<SignedOctree> {
     let radius = 0.5 * gap / frame.cell_size();
     check_gap(gap, frame)?;
-    let faces = Band::around(source, frame, radius, progress)?;
+    let held = 2 * hits.bytes();
+    progress.hold((held + seed_bytes(hits.edges().bricks().len())) as u64)?;
+    let faces = Band::around(source, frame, radius, &Beside { progress, bytes: held as u64 })?;
+    let held = held + faces.bytes() + faces.keys().len() * (WALL_BYTES + GIVEN_BYTES);
+    progress.hold(held as u64)?;
     let far = Walls::new(hits, &[&faces], |key| !faces.within(key, radius));
     let far_regions = Regions::new(&far);
     let outer = |key: Key| match far.find(key) {
@@ -92,11 +100,12 @@ pub fn hull_with_gap(
         None if far_regions.of_absent(key) == 0 => Plane::FULL,
         None => Plane::EMPTY,
     };
-    let rim = Band::around_crossings(
-        rolled(hits, &far, &faces, radius, outer).crossings(),
-        radius + tolerance(radius),
-        progress,
-    )?;
+    let rolled = rolled(hits, &far, &faces, radius, outer);
+    let beside = Beside { progress, bytes: held as u64 };
+    let rim = Band::around_crossings(rolled.crossings(), radius + tolerance(radius), &beside)?;
+    drop(rolled);
+    let most = faces.keys().len() + rim.keys().len();
+    progress.hold((held + rim.bytes() + most * (WALL_BYTES + GIVEN_BYTES)) as u64)?;
     let grown = |key: Key| outer(key) | rim.within(key, radius + tolerance(radius));
     let near = Walls::new(hits, &[&faces, &rim], grown);
     let regions = Regions::new(&near);
@@ -193,6 +202,10 @@ fn samples_of(
     }
     found.into_iter().peekable()
 }
+
+/// Bytes for each brick of [`Walls`] and of their regions.
+const WALL_BYTES: usize =
+    size_of::<(Key, [Plane; 3])>() + size_of::<Plane>() + 2 * size_of::<(Key, u32)>() + REGION_BYTES;
 
 /// Edges that are closed because a face hits them, or because just one of their ends lies in a set.
 struct Walls {

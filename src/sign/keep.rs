@@ -4,8 +4,9 @@
 //! are filled, those that a dropped solid lay in included.
 
 use crate::error::{Error, Result};
-use crate::octree::components::{Component, Components};
+use crate::octree::components::{Component, Components, component_bytes};
 use crate::octree::signed::SignedOctree;
+use crate::progress::Progress;
 use std::cmp::Reverse;
 
 /// Which solids stay. Their size is the number of grid edges that their surfaces cross, as in `PolyMender`.
@@ -78,13 +79,19 @@ impl Keep {
 /// Cost: linear in bricks; that of [`Components`] for each of both.
 ///
 /// # Errors
-/// As [`Keep::check`].
-pub fn keep(mut octree: SignedOctree, keep: Keep, drop_cavities: bool) -> Result<(SignedOctree, Kept)> {
+/// As [`Keep::check`], and `Memory` when `progress` says so.
+pub fn keep(
+    mut octree: SignedOctree,
+    keep: Keep,
+    drop_cavities: bool,
+    progress: &dyn Progress,
+) -> Result<(SignedOctree, Kept)> {
     keep.check()?;
     let mut kept = Kept::default();
     if keep == Keep::All && !drop_cavities {
         return Ok((octree, kept));
     }
+    progress.hold(component_bytes(&octree) as u64)?;
     let components = Components::new(&octree);
     kept.solids = components.solids().count() as u64;
     kept.cavities = components.cavities().count() as u64;

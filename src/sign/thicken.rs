@@ -11,7 +11,7 @@
 //!
 //! Cost: that of a scan, and of a [`Band`] of half the width; a hash probe or two for each lattice point near a face in question.
 
-use super::band::{All, Band, MOST_CELLS, Wanted};
+use super::band::{All, Band, MOST_CELLS, Wanted, seed_bytes};
 use super::scan_oriented;
 use crate::error::{Error, Result};
 use crate::geom::Frame;
@@ -24,8 +24,8 @@ use crate::mesh::TriangleSource;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::OrientedHits;
 use crate::octree::point_set::PointSet;
-use crate::octree::signed::{SignedOctree, Uniform};
-use crate::progress::Progress;
+use crate::octree::signed::{GIVEN_BYTES, SignedOctree, Uniform};
+use crate::progress::{Beside, Progress};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -71,7 +71,8 @@ fn lost_edges(hits: &OrientedHits, octree: &SignedOctree) -> Vec<(Key, [Plane; 3
 /// Adds walls of `width` model units, half on each side, to the solids of `octree`, which was made from the same source and frame.
 ///
 /// # Errors
-/// When the wall is thinner than two cells or thicker than 120; whatever the source returns; and `Cancelled`.
+/// When the wall is thinner than two cells or thicker than 120; whatever the source returns; `Cancelled`, and `Memory` when `progress`
+/// says so.
 pub fn thicken(
     octree: &SignedOctree,
     source: &mut dyn TriangleSource,
@@ -82,13 +83,21 @@ pub fn thicken(
 ) -> Result<SignedOctree> {
     check_width(width, frame)?;
     let radius = 0.5 * width / frame.cell_size();
+    let beside = Beside { progress, bytes: octree.bytes() as u64 };
     let band = match what {
-        Thicken::All => Band::around_wanted(source, frame, radius, &All, progress)?,
+        Thicken::All => {
+            beside.hold(seed_bytes(octree.crossings().bricks().len()) as u64)?;
+            Band::around_wanted(source, frame, radius, &All, &beside)?
+        }
         Thicken::Sheets => {
-            let lost = Lost::new(octree, source, frame, progress)?;
-            Band::around_wanted(source, frame, radius, &lost, progress)?
+            let lost = Lost::new(octree, source, frame, &beside)?;
+            let beside = Beside { progress: &beside, bytes: lost.bytes() as u64 };
+            beside.hold(seed_bytes(lost.reaches.bricks()) as u64)?;
+            Band::around_wanted(source, frame, radius, &lost, &beside)?
         }
     };
+    let bricks = octree.crossings().bricks().len() + band.keys().len();
+    beside.hold((octree.bytes() + band.bytes() + bricks * GIVEN_BYTES) as u64)?;
     Ok(united(octree, &band, radius))
 }
 
@@ -256,6 +265,10 @@ impl<'a> Lost<'a> {
         let lost = lost.into_iter().map(|(key, [x, y, z])| (key, (x | y | z) & !about_mixed.plane(key)));
         let reaches = PointSet::new(depth, lost).dilated().dilated().dilated();
         Ok(Lost { octree, uniform: octree.uniform(), mixed, about_mixed, reaches, shift: frame.cell_shift() })
+    }
+
+    fn bytes(&self) -> usize {
+        [&self.mixed, &self.about_mixed, &self.reaches].into_iter().map(PointSet::bytes).sum()
     }
 
     fn is_inside(&self, at: [u32; 3]) -> bool {

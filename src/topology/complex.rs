@@ -193,6 +193,12 @@ impl Complex {
         std::array::from_fn(|extent| solid[7 - extent].turned_over())
     }
 
+    /// Bytes that [`new`](Self::new) takes for an octree, at most.
+    pub fn bytes_for(octree: &EditedOctree) -> usize {
+        let bricks = octree.signed().crossings().bricks().len() + octree.edited_bricks().len();
+        bricks * (size_of::<Planes>() + size_of::<Brick>() + 2 * size_of::<(Key, u32)>())
+    }
+
     /// Object or background.
     pub fn side(&self) -> Side {
         self.side

@@ -5,15 +5,16 @@ use super::complex::{Complex, Side};
 use super::member::{Members, component_of, flow};
 use super::options::{Measure, Options};
 use super::patch::patches;
-use super::section::{Sections, Signs};
+use super::section::{SIGN_BYTES, Sections, Signs};
 use super::skeleton::{Arc, Skeleton};
 use super::span::{Loop, loops};
 use super::thin::thin;
 use super::volumes::move_small;
 use crate::error::Result;
 use crate::grid::Key;
+use crate::octree::components::component_bytes;
 use crate::octree::{EditedOctree, SignedOctree};
-use crate::progress::{Progress, Stage};
+use crate::progress::{Beside, Progress, Stage};
 use rayon::prelude::*;
 
 /// How a loop is removed.
@@ -102,10 +103,13 @@ impl Loops {
     /// memory grow with the surface, and not with the volume.
     ///
     /// # Errors
-    /// `Cancelled`.
+    /// `Cancelled`, and `Memory` when `progress` says so.
     pub fn find(octree: &EditedOctree, side: Side, limit: f64, progress: &dyn Progress) -> Result<Loops> {
+        let beside = Beside { progress, bytes: octree.bytes() as u64 };
+        beside.hold(Complex::bytes_for(octree) as u64)?;
         let mut complex = Complex::new(octree, side);
-        thin(&mut complex, layers(limit), progress)?;
+        thin(&mut complex, layers(limit), &beside)?;
+        beside.hold((complex.bytes() + complex.bricks() * SIGN_BYTES) as u64)?;
         let skeleton = Skeleton::new(&complex);
         let found = loops(octree, &complex, &skeleton, limit, progress)?;
         let kind = match side {
@@ -114,6 +118,7 @@ impl Loops {
         };
         let mut handles = Vec::with_capacity(found.len());
         if !found.is_empty() {
+            beside.hold((complex.bytes() + component_bytes(octree.signed())) as u64)?;
             let members = Members::new(octree.signed());
             handles.extend(found.iter().map(|Loop { edge, section, centre }| Handle {
                 kind,
@@ -197,7 +202,7 @@ pub fn handles(octree: &EditedOctree, limit: f64, progress: &dyn Progress) -> Re
 /// Repairs the topology of a solid: drops floating parts, fills cavities, cuts handles, fills tunnels, in this order.
 ///
 /// # Errors
-/// When an option is out of range, and `Cancelled`.
+/// When an option is out of range, `Cancelled`, and `Memory` when `progress` says so.
 pub fn repair_topology(
     signed: SignedOctree,
     options: &Options,
@@ -229,7 +234,9 @@ pub fn repair_topology_watched(
 ) -> Result<(EditedOctree, TopologyReport)> {
     options.check()?;
     progress.begin(Stage::Topology, 0);
+    progress.hold(component_bytes(&signed) as u64)?;
     let mut octree = EditedOctree::unedited(signed);
+    progress.hold((octree.bytes() + Complex::bytes_for(&octree)) as u64)?;
     let mut report = TopologyReport { before: Betti::of(&octree), ..TopologyReport::default() };
     for (side, volume, moved) in [
         (Side::Object, options.drop_islands, &mut report.islands_dropped),

@@ -117,6 +117,9 @@ const FOLDS: usize = 256;
 /// The length from which on lines are all the same, in cells.
 const FAR: u32 = 64;
 
+/// Bytes of [`Signs`] for each brick.
+pub(super) const SIGN_BYTES: usize = 2 * size_of::<Plane>();
+
 /// What a complex was before it was thinned, by brick, in the complex's own coordinates.
 pub(super) struct Signs {
     /// The signs of the points of the grid.

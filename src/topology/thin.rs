@@ -74,13 +74,16 @@ const fn axis_alone(axis: Axis) -> Extent {
     Extent::POINT.with(axis)
 }
 
+/// Bytes for each brick that a front is in.
+const FRONT_BYTES: usize = size_of::<Marks>() + size_of::<Work>();
+
 /// Bricks that a thread takes at least.
 const GRAIN: usize = 64;
 
 /// Collapses whatever can be collapsed; cells only in the first `layers` steps, if that is given.
 ///
 /// # Errors
-/// `Cancelled`.
+/// `Cancelled`, and `Memory` when `progress` says so.
 pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress) -> Result<Thinned> {
     let mut done = Thinned::default();
     let before = complex.count();
@@ -89,6 +92,9 @@ pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress)
     let (mut marks, mut place_of) = (Vec::new(), Vec::new());
     loop {
         check(progress)?;
+        if done.steps.is_multiple_of(8) {
+            progress.hold((complex.bytes() + active.len() * FRONT_BYTES) as u64)?;
+        }
         let axes = ERODED[done.steps as usize % ERODED.len()];
         let erode = if layers.is_none_or(|layers| done.steps < layers) { Some(axes) } else { None };
         marks.resize_with(active.len(), Marks::default);

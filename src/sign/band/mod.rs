@@ -61,6 +61,15 @@ const BEYOND: i16 = i16::MAX;
 #[derive(Debug, Clone, PartialEq)]
 struct Field([[i16; 512]; 3]);
 
+/// Bytes for each brick, its place in an index included.
+pub(super) const BRICK_BYTES: usize =
+    size_of::<Field>() + 2 * size_of::<(Key, Box<Field>)>() + 2 * size_of::<(Key, u32)>();
+
+/// Bytes that the first step takes at most for a surface with so many bricks.
+pub(super) fn seed_bytes(bricks: usize) -> usize {
+    2 * bricks * BRICK_BYTES
+}
+
 impl Field {
     const EMPTY: Field = Field([[BEYOND; 512]; 3]);
 
@@ -117,7 +126,7 @@ impl Band {
     /// the grid, or without area, have none.
     ///
     /// # Errors
-    /// Whatever the source returns, and `Cancelled`.
+    /// Whatever the source returns, `Cancelled`, and `Memory` when `progress` says so.
     ///
     /// # Panics
     /// When `reach` is greater than [`MOST_CELLS`].
@@ -142,7 +151,7 @@ impl Band {
                 }
             });
             progress.advance(batch.len() as u64);
-            Ok(())
+            progress.hold(seeds.bytes() as u64)
         })?;
         Band::spread(frame.depth(), seeds, reach, progress)
     }
@@ -150,7 +159,7 @@ impl Band {
     /// The band of `reach` cells round the places where edges are crossed.
     ///
     /// # Errors
-    /// `Cancelled`.
+    /// `Cancelled`, and `Memory` when `progress` says so.
     ///
     /// # Panics
     /// When `reach` is greater than [`MOST_CELLS`].
@@ -177,6 +186,7 @@ impl Band {
     fn spread(depth: u32, seeds: Seeds, reach: f64, progress: &dyn Progress) -> Result<Self> {
         assert!(reach <= MOST_CELLS, "ways have 16 bits");
         // The far ends of edges that leave the band have a distance, too.
+        progress.hold(seeds.bytes() as u64)?;
         let bricks = spread::spread(seeds.into_bricks(), reach + 1.0 + SLACK, progress)?;
         let mut index = LinearOctree::with_capacity(bricks.len());
         for (i, (key, _)) in (0..).zip(&bricks) {
@@ -199,7 +209,7 @@ impl Band {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.bricks.len() * (size_of::<Field>() + size_of::<(Key, Box<Field>)>()) + self.index.allocated_bytes()
+        self.bricks.len() * BRICK_BYTES
     }
 
     /// The way from a lattice point to its closest point, in cells; `None` beyond the band.

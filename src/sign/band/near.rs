@@ -1,12 +1,13 @@
 //! Closest points of triangles for the lattice points about them.
 
-use super::{Field, NEAR, UNIT, Wanted};
+use super::{BRICK_BYTES, Field, NEAR, UNIT, Wanted};
 use crate::geom::raster::FineTriangle;
 use crate::grid::Key;
 use crate::grid::brick::Local;
 use crate::octree::LinearOctree;
 use glam::DVec3;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Locks that threads seldom meet at.
 const SHARDS: usize = 256;
@@ -19,11 +20,18 @@ const SMALL: f64 = 12.0;
 pub(super) struct Seeds {
     depth: u32,
     shards: Vec<Mutex<LinearOctree<Box<Field>>>>,
+    bricks: AtomicUsize,
 }
 
 impl Seeds {
     pub(super) fn new(depth: u32) -> Self {
-        Seeds { depth, shards: (0..SHARDS).map(|_| Mutex::new(LinearOctree::new())).collect() }
+        let shards = (0..SHARDS).map(|_| Mutex::new(LinearOctree::new())).collect();
+        Seeds { depth, shards, bricks: AtomicUsize::new(0) }
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        self.bricks.load(Ordering::Relaxed) * BRICK_BYTES
     }
 
     /// All bricks, sorted.
@@ -43,7 +51,10 @@ impl Seeds {
         let Some(key) = Key::cell(self.depth - 3, brick) else { return };
         let [x, y, z] = brick.map(|c| c as usize);
         let mut shard = self.shards[(x ^ y << 3 ^ z << 5) % SHARDS].lock().expect(NO_PANIC);
-        change(shard.get_or_insert_with(key, || Box::new(Field::EMPTY)));
+        change(shard.get_or_insert_with(key, || {
+            self.bricks.fetch_add(1, Ordering::Relaxed);
+            Box::new(Field::EMPTY)
+        }));
     }
 
     /// Offers a point, in cells, to the lattice points about it.

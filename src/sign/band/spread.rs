@@ -4,7 +4,7 @@
 //! which something changed take what their 26 neighbours have at their sides, and then pass ways on within: in one sweep upward and one
 //! downward, a row of eight points at once. Rounds read what the one before left, so threads make no difference.
 
-use super::{BEYOND, Field, UNIT};
+use super::{BEYOND, BRICK_BYTES, Field, UNIT};
 use crate::error::Result;
 use crate::grid::brick::Plane;
 use crate::grid::{Direction, Key};
@@ -42,6 +42,8 @@ pub(super) fn spread(
             break;
         }
         check(progress)?;
+        // At worst, all of the active ones change.
+        progress.hold(((bricks.len() + active.len()) * BRICK_BYTES) as u64)?;
         let look = |key: Key| index.get(key).map(|&i| &*bricks[i as usize].1);
         let changes: Vec<(Key, Box<Field>, Plane)> = active
             .par_iter()
