@@ -167,6 +167,44 @@ fn building(group: &mut BenchmarkGroup<'_, WallTime>) {
     });
 }
 
+/// Neighbours and traversals.
+fn walking(group: &mut BenchmarkGroup<'_, WallTime>, tree: &LinearOctree<u64>, sorted: &[Key], shuffled: &[Key]) {
+    for (order, keys) in [("random", shuffled), ("coherent", sorted)] {
+        group.bench_function(format!("all 6 face neighbours, {order}"), |b| {
+            let across = |leaf, face| tree.neighbours(leaf, face).map(|(_, &record)| record & 1).sum::<u64>();
+            let around = |&leaf: &Key| Face::ALL.into_iter().map(|face| across(leaf, face)).sum::<u64>();
+            let mut rounds = rounds(keys);
+            b.iter(|| next(&mut rounds).iter().map(around).sum::<u64>());
+        });
+    }
+    group.bench_function("all neighbours, coherent", |b| {
+        let around = |&leaf: &Key| tree.all_neighbours(leaf).map(|(_, &record)| record & 1);
+        let mut rounds = rounds(sorted);
+        b.iter(|| next(&mut rounds).iter().flat_map(around).sum::<u64>());
+    });
+
+    group.throughput(Throughput::Elements(tree.len() as u64));
+    group.bench_function("traverse, table order", |b| {
+        b.iter(|| tree.iter().map(|(_, &record)| record & 1).sum::<u64>());
+    });
+    group.bench_function("traverse, Z-order", |b| {
+        b.iter(|| tree.iter_z().map(|(_, &record)| record & 1).sum::<u64>());
+    });
+    group.bench_function("traverse, Z-order, all threads", |b| {
+        b.iter(|| tree.par_iter_z().map(|(_, &record)| record & 1).sum::<u64>());
+    });
+    let mut elements = 0;
+    tree.visit_dual(|_| elements += 1);
+    group.throughput(Throughput::Elements(elements));
+    group.bench_function("traverse, dual", |b| {
+        b.iter(|| {
+            let mut count = 0u64;
+            tree.visit_dual(|dual| count += u64::from(dual.extent.dimension()));
+            count
+        });
+    });
+}
+
 fn octree(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("octree");
     // First, while memory is not fragmented.
@@ -252,41 +290,7 @@ fn octree(criterion: &mut Criterion) {
             walk.sum::<u64>()
         });
     });
-
-    for (order, keys) in [("random", &shuffled), ("coherent", &sorted)] {
-        group.bench_function(format!("all 6 face neighbours, {order}"), |b| {
-            let across = |leaf, face| tree.neighbours(leaf, face).map(|(_, &record)| record & 1).sum::<u64>();
-            let around = |&leaf: &Key| Face::ALL.into_iter().map(|face| across(leaf, face)).sum::<u64>();
-            let mut rounds = rounds(keys);
-            b.iter(|| next(&mut rounds).iter().map(around).sum::<u64>());
-        });
-    }
-    group.bench_function("all neighbours, coherent", |b| {
-        let around = |&leaf: &Key| tree.all_neighbours(leaf).map(|(_, &record)| record & 1);
-        let mut rounds = rounds(&sorted);
-        b.iter(|| next(&mut rounds).iter().flat_map(around).sum::<u64>());
-    });
-
-    group.throughput(Throughput::Elements(tree.len() as u64));
-    group.bench_function("traverse, table order", |b| {
-        b.iter(|| tree.iter().map(|(_, &record)| record & 1).sum::<u64>());
-    });
-    group.bench_function("traverse, Z-order", |b| {
-        b.iter(|| tree.iter_z().map(|(_, &record)| record & 1).sum::<u64>());
-    });
-    group.bench_function("traverse, Z-order, all threads", |b| {
-        b.iter(|| tree.par_iter_z().map(|(_, &record)| record & 1).sum::<u64>());
-    });
-    let mut elements = 0;
-    tree.visit_dual(|_| elements += 1);
-    group.throughput(Throughput::Elements(elements));
-    group.bench_function("traverse, dual", |b| {
-        b.iter(|| {
-            let mut count = 0u64;
-            tree.visit_dual(|dual| count += u64::from(dual.extent.dimension()));
-            count
-        });
-    });
+    walking(&mut group, &tree, &sorted, &shuffled);
 }
 
 criterion_group! {

@@ -119,21 +119,30 @@ impl<T> LinearOctree<T> {
         block.leaves.has(place).then(|| &mut block.records[block.leaves.rank(place)])
     }
 
-    /// As [`LinearOctree::get_or_insert_with`]; tells also whether the leaf was there.
-    pub(super) fn place_record(&mut self, cell: Key, record: impl FnOnce() -> T) -> (&mut T, bool) {
+    /// As [`LinearOctree::insert`].
+    pub(super) fn put_record(&mut self, cell: Key, record: T) -> Option<T> {
         assert!(cell.is_cell(), "{cell} cannot be a leaf");
         let (name, place) = cell.block();
         let block = self.blocks.entry(name).or_insert(Block::EMPTY);
-        let is_new = !block.leaves.has(place);
-        if is_new {
-            let is_first = (block.nodes() & Cells::family(place)).is_empty();
-            self.room += block.add(place, record());
-            self.levels.add(cell, 1);
-            if is_first {
-                self.refine_above(cell);
-            }
+        if block.leaves.has(place) {
+            let rank = block.leaves.rank(place);
+            return Some(std::mem::replace(&mut block.records[rank], record));
         }
-        (self.record_mut(cell).expect("just made"), !is_new)
+        let is_first = (block.nodes() & Cells::family(place)).is_empty();
+        self.room += block.add(place, record);
+        self.levels.add(cell, 1);
+        if is_first {
+            self.refine_above(cell);
+        }
+        None
+    }
+
+    /// As [`LinearOctree::get_or_insert_with`].
+    pub(super) fn record_or_put(&mut self, cell: Key, record: impl FnOnce() -> T) -> &mut T {
+        if !self.contains(cell) {
+            self.put_record(cell, record());
+        }
+        self.record_mut(cell).expect("just made")
     }
 
     /// Makes all children of a cell leaves; it is marked as refined, and no child is a leaf or refined. One probe.

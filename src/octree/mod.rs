@@ -195,9 +195,7 @@ impl<T> LinearOctree<T> {
     ///
     /// If the key is not that of a cell.
     pub fn insert(&mut self, cell: Key, record: T) -> Option<T> {
-        let mut record = Some(record);
-        let (place, was_there) = self.place_record(cell, || record.take().expect("asked for once"));
-        if was_there { record.map(|record| std::mem::replace(place, record)) } else { None }
+        self.put_record(cell, record)
     }
 
     /// As [`insert`](LinearOctree::insert), but refuses keys that are not cells, and cells inside or around another leaf. A probe
@@ -227,7 +225,7 @@ impl<T> LinearOctree<T> {
     ///
     /// If the key is not that of a cell.
     pub fn get_or_insert_with(&mut self, cell: Key, record: impl FnOnce() -> T) -> &mut T {
-        self.place_record(cell, record).0
+        self.record_or_put(cell, record)
     }
 
     /// Removes exactly this leaf and returns its record. One probe, and one more for each ancestor that has no leaves left.
