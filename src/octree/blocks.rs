@@ -10,10 +10,9 @@
 //! - A block without leaves and without refined cells is not there.
 //!
 //! A cell's parent changes only when the first of the eight siblings appears or the last one goes; that is seen in one byte, so most
-//! changes touch one block. In trees that cover the root a block has at least 7 leaves for each that it owes its being to.
+//! changes touch one block. A tree that covers the root has at least 7 leaves for each block, but for one.
 
-use super::Block;
-use super::LinearOctree;
+use super::{Block, LinearOctree};
 use crate::grid::block::Cells;
 use crate::grid::{Corner, Key};
 use hashbrown::hash_map::Entry;

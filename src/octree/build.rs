@@ -163,7 +163,7 @@ impl LinearOctree<Range<u32>> {
     /// coincide. Returns it with the order of the points along the curve: the record of a leaf is the range of its points there. Points
     /// with a coordinate above 2^19 are left out.
     ///
-    /// Sorts 12 bytes a point on all threads, then O(n) bisections; a point is in the range of one leaf only.
+    /// Sorts 16 bytes a point on all threads, then O(n) bisections; a point is in the range of one leaf only.
     ///
     /// # Panics
     ///
