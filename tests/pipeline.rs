@@ -10,7 +10,8 @@ use common::{Topology, check_repaired, data, files, name, surfaces};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use zmend::{Inside, Mesh, Options, Surface, io, repair};
+use zmend::progress::Silent;
+use zmend::{Inside, Mesh, Options, RepairReport, Repaired, Solid, Surface, io, repair, solidify};
 
 /// What came of one file.
 #[derive(Default)]
@@ -56,12 +57,19 @@ fn sweep(path: &Path, depths: &[u32], rules: &[Inside]) -> Outcome {
     outcome
 }
 
+/// Repairs by marching cubes; the other surfaces are extracted from one and the same solid.
 fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, inside: Inside, outcome: &mut Outcome) {
     let mut first: Option<Topology> = None;
+    let with_normals = Options { depth, inside, surface: Surface::DualContouring, ..Options::default() };
+    let solid = solidify(&mut mesh.clone(), &with_normals, &Silent);
     for (mode, options) in surfaces(depth) {
         let mode = format!("{mode} by {inside:?}");
         let options = Options { inside, ..options };
-        let repaired = match repair(mesh.clone(), &options) {
+        let repaired = match (&solid, options.surface) {
+            (Ok((solid, report)), surface) if surface != Surface::MarchingCubes => extracted(solid, report, &options),
+            _ => repair(mesh.clone(), &options),
+        };
+        let repaired = match repaired {
             Ok(repaired) => repaired,
             Err(error) => {
                 outcome.failures.push(format!("{name} depth {depth} {mode}: refused: {error}"));
@@ -84,6 +92,13 @@ fn sweep_mesh(name: &str, mesh: &Mesh, depth: u32, inside: Inside, outcome: &mut
             }
         }
     }
+}
+
+/// A surface of a solid, as `repair` would give it.
+fn extracted(solid: &Solid, report: &RepairReport, options: &Options) -> zmend::Result<Repaired> {
+    let mut mesh = Mesh::default();
+    let sizes = solid.extract(options, &mut mesh, &Silent)?;
+    Ok(Repaired { mesh, report: RepairReport { sizes, ..report.clone() } })
 }
 
 /// Files that hold no mesh. Everything else must be read.

@@ -66,7 +66,7 @@ impl ClosedEdges for Crossings {
 }
 
 /// Bytes for each brick while regions are found: two parts on average, twice, with their nodes, and the brick's place in a row.
-pub const REGION_BYTES: usize = 4 * size_of::<Plane>() + 2 * size_of::<(u64, u32)>() + 8 * size_of::<u32>();
+pub const REGION_BYTES: usize = 4 * size_of::<Plane>() + 2 * size_of::<(u64, u32)>() + 2 * size_of::<[u32; 4]>();
 
 /// All lattice points in regions, numbered from 0: the outer one, then in the order in which bricks meet them.
 #[derive(Debug)]

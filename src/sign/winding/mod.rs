@@ -26,10 +26,12 @@
 
 mod boundary;
 mod circulation;
+mod field;
 mod levels;
 mod net;
 mod open;
 mod patches;
+mod polynomial;
 mod samples;
 mod span;
 mod view;

@@ -4,7 +4,7 @@
 //! spanning surface. Nearly everywhere that is known without looking at the point:
 //!
 //! - From the root down, cells which no patch enters are looked at. Where patches are too small and too far for |s| to come to one half,
-//!   inside is where n is positive. Else the angle at the cell's middle and a bound of how much it differs within (`Span::steepness`) may
+//!   inside is where n is positive. Else the angle at the cell's middle and a bound of how much it differs within (`Field::steepness`) may
 //!   leave one answer to how large n must be. Then the cell is *calm*: bits of n are compared, 64 points at once. Cells without hits, whose
 //!   n is one number, are calm wherever w stays away from one half.
 //! - What is left are *rough* bricks: near the boundary, along patches, and where the surface w = 1/2 closes a hole. In each block of 4 x 4 x 4
@@ -17,11 +17,11 @@
 //! Beside a flat sheet w comes as near to one half as the sheet is large, on one side from below, or inside of a solid from above. So the few
 //! points nearer to it than angles are right are *ties*: they go with their neighbours if all of these agree.
 
+use super::field::{ERROR, Field};
 use super::levels::{Counter, Layer, Rows, Steps};
 use super::net::Net;
 use super::patches::Patches;
 use super::samples::{Rule, push_samples};
-use super::span::ERROR;
 use super::view::{VIEW_ERROR, View};
 use super::whole::steps_of;
 use crate::error::Result;
@@ -35,6 +35,7 @@ use crate::octree::hits::OrientedHits;
 use crate::progress::{Progress, Stage, check};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::cell::OnceCell;
 use std::cmp::Ordering;
 
 /// The outcome of [`winding_signs`].
@@ -71,14 +72,22 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
 
     // The same again with all rough bricks, and those before them, which own edges into them.
     let bricks = bricks.with(parts.rough());
-    progress.hold((hits.bytes() / 4 * 5 + patches.bytes() + bricks.keys.len() * BRICK_BYTES) as u64)?;
+    let held = hits.bytes() / 4 * 5 + patches.bytes() + parts.bytes() + bricks.keys.len() * BRICK_BYTES;
+    progress.hold(held as u64)?;
     let mut rows = bricks.rows();
     let angles = Angles::new(hits, patches);
     let made = rows.walk(
         |i| bricks.steps(i),
         |i| {
             let key = bricks.keys[i];
-            Points { angles: &angles, key, least: parts.least(key), numbers: Vec::new(), inside: Plane::EMPTY }
+            Points {
+                angles: &angles,
+                parts: &parts,
+                key,
+                least: parts.least(key),
+                numbers: Vec::new(),
+                inside: Plane::EMPTY,
+            }
         },
     );
     check(progress)?;
@@ -95,9 +104,11 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     let octree = SignedOctree::from_signs(depth, edges.with_normals(), &signs, uniform, |i, crossed, out| {
         let (key, inside) = &signs[i];
         let origin = lattice_point(depth, *key);
+        let field = OnceCell::new();
         let elsewhere = |axis, local: Local| {
             let c = local.coords();
-            angles.sample(axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
+            let field = field.get_or_init(|| angles.of_brick(&parts, *key));
+            angles.sample(field, axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
         };
         push_samples(hits, *key, inside, crossed, rule, elsewhere, out);
     });
@@ -204,10 +215,16 @@ impl<'a> Bricks<'a> {
     }
 }
 
+/// Levels between a district and its bricks.
+const DISTRICT: u32 = 2;
+
 /// The root, divided into calm cells and rough bricks.
+#[derive(Default)]
 struct Parts {
     /// The first brick of each, in order of keys, and the least number that is inside; none for rough bricks.
     parts: Vec<(Key, Option<i32>)>,
+    /// The cells of 4 x 4 x 4 bricks that have several parts, sorted, and what they see.
+    districts: Vec<(Key, Field)>,
 }
 
 impl Parts {
@@ -221,7 +238,7 @@ impl Parts {
             spanned: keys(&bricks.patches.hits),
             rows,
         };
-        Parts { parts: divide.in_parallel(Key::ROOT) }
+        divide.parts(Key::ROOT, &divide.angles.whole)
     }
 
     fn rough(&self) -> impl Iterator<Item = Key> {
@@ -232,6 +249,28 @@ impl Parts {
     fn least(&self, brick: Key) -> Option<i32> {
         let next = self.parts.partition_point(|part| part.0 <= brick);
         self.parts[next - 1].1
+    }
+
+    /// What the district of a brick sees, if that has several parts.
+    fn district(&self, brick: Key) -> Option<&Field> {
+        let district = brick.ancestor(brick.level()?.saturating_sub(DISTRICT));
+        let place = self.districts.binary_search_by_key(&district, |d| d.0).ok()?;
+        Some(&self.districts[place].1)
+    }
+
+    fn bytes(&self) -> usize {
+        let districts: usize = self.districts.iter().map(|(_, field)| field.bytes()).sum();
+        districts + self.parts.capacity() * size_of::<(Key, Option<i32>)>()
+    }
+
+    /// Parts of cells in their order.
+    fn joined(parts: impl IntoIterator<Item = Parts>) -> Parts {
+        let mut all = Parts::default();
+        for Parts { parts, districts } in parts {
+            all.parts.extend(parts);
+            all.districts.extend(districts);
+        }
+        all
     }
 }
 
@@ -246,25 +285,32 @@ struct Divide<'a> {
 }
 
 impl Divide<'_> {
-    /// The parts of a cell, the upper levels by several threads.
-    fn in_parallel(&self, cell: Key) -> Vec<(Key, Option<i32>)> {
+    /// The parts of a cell, the upper levels by several threads; `field` is what the cell above it sees.
+    fn parts(&self, cell: Key, field: &Field) -> Parts {
+        let calm = self.calm(cell, field);
         let level = cell.level().expect("a cell");
-        if level < 3.min(self.depth - 3) && self.calm(cell).is_none() {
-            let parts = cell.children().into_par_iter().map(|child| self.in_parallel(child));
-            return parts.flatten_iter().collect();
+        let bricks = self.depth - 3;
+        if calm.is_some() || level == bricks {
+            return Parts { parts: vec![(self.ends(cell)[0], calm)], districts: Vec::new() };
         }
-        let mut out = Vec::new();
-        self.push(cell, &mut out);
-        out
+        let (middle, radius) = self.ball(cell);
+        let field = self.angles.within(field, middle, radius);
+        let of_child = |child| self.parts(child, &field);
+        let mut parts = if level < 3 {
+            Parts::joined(cell.children().into_par_iter().map(of_child).collect::<Vec<_>>())
+        } else {
+            Parts::joined(cell.children().map(of_child))
+        };
+        if level == bricks.saturating_sub(DISTRICT) {
+            parts.districts.push((cell, field));
+        }
+        parts
     }
 
-    fn push(&self, cell: Key, out: &mut Vec<(Key, Option<i32>)>) {
-        let calm = self.calm(cell);
-        if calm.is_some() || cell.level() == Some(self.depth - 3) {
-            out.push((self.ends(cell)[0], calm));
-        } else {
-            cell.children().into_iter().for_each(|child| self.push(child, out));
-        }
+    /// Middle and radius of a cell.
+    fn ball(&self, cell: Key) -> ([u32; 3], f64) {
+        let half = 1 << (self.depth - 1 - cell.level().expect("a cell"));
+        (lattice_point(self.depth, cell).map(|c| c + half), f64::from(half) * 3f64.sqrt())
     }
 
     /// The first and the last brick of a cell.
@@ -274,25 +320,23 @@ impl Divide<'_> {
         [first, first.map(|c| c + side - 1)].map(|at| Key::cell(self.depth - 3, at).expect("in the root"))
     }
 
-    /// The least number that is inside, if it is the same in all of the cell.
-    fn calm(&self, cell: Key) -> Option<i32> {
+    /// The least number that is inside, if it is the same in all of the cell; `field` is that of a cell round it.
+    fn calm(&self, cell: Key, field: &Field) -> Option<i32> {
         let [first, last] = self.ends(cell);
         let any = |keys: &[Key]| keys.get(keys.partition_point(|&key| key < first)).is_some_and(|&key| key <= last);
         if any(&self.spanned) {
             return None;
         }
-        let half = 1 << (self.depth - 1 - cell.level().expect("a cell"));
-        let middle = lattice_point(self.depth, cell).map(|c| c + half);
-        let radius = f64::from(half) * 3f64.sqrt();
-        if self.angles.are_minor(middle, radius) {
+        let (middle, radius) = self.ball(cell);
+        if self.angles.are_minor(field, middle, radius) {
             return Some(least(0.0));
         }
-        let [first_order, _] = self.angles.steepness(middle, radius);
+        let [first_order, _] = self.angles.steepness(field, middle, radius);
         let reach = first_order * radius + ERROR;
         if reach.is_infinite() {
             return None;
         }
-        let angle = self.angles.at(middle);
+        let angle = self.angles.at(field, middle);
         if any(&self.surface) {
             let bounds = [least(angle - reach), least(angle + reach)];
             return (bounds[0] == bounds[1]).then_some(bounds[0]);
@@ -306,13 +350,15 @@ impl Divide<'_> {
 struct Angles<'a> {
     hits: &'a OrientedHits,
     patches: &'a Patches,
+    /// What the root sees.
+    whole: Field,
     /// log2 of fixed-point units in a cell.
     shift: u32,
 }
 
 impl<'a> Angles<'a> {
     fn new(hits: &'a OrientedHits, patches: &'a Patches) -> Self {
-        Angles { hits, patches, shift: FINE_BITS - hits.edges().depth() }
+        Angles { hits, patches, whole: Field::whole(&patches.span), shift: FINE_BITS - hits.edges().depth() }
     }
 
     fn fine(&self, point: [u32; 3]) -> [i32; 3] {
@@ -323,36 +369,51 @@ impl<'a> Angles<'a> {
         f64::from(1u32 << self.shift)
     }
 
-    fn at(&self, point: [u32; 3]) -> f64 {
-        self.patches.span.angle(self.fine(point))
+    /// What is seen so many cells around a point; `field` is that of a ball round it.
+    fn within(&self, field: &Field, point: [u32; 3], radius: f64) -> Field {
+        field.within(&self.patches.span, self.place(point), radius * self.unit())
+    }
+
+    /// What a brick sees.
+    fn of_brick(&self, parts: &Parts, brick: Key) -> Field {
+        let middle = lattice_point(self.hits.edges().depth(), brick).map(|c| c + 4);
+        self.within(parts.district(brick).unwrap_or(&self.whole), middle, 4.0 * 3f64.sqrt())
+    }
+
+    fn place(&self, point: [u32; 3]) -> DVec3 {
+        DVec3::from(self.fine(point).map(f64::from))
+    }
+
+    fn at(&self, field: &Field, point: [u32; 3]) -> f64 {
+        field.angle(&self.patches.span, self.fine(point))
     }
 
     /// The angle at a point, and how it changes by the cell.
-    fn tangent(&self, point: [u32; 3]) -> (f64, DVec3) {
-        let (angle, slope) = self.patches.span.angle_and_slope(self.fine(point));
+    fn tangent(&self, field: &Field, point: [u32; 3]) -> (f64, DVec3) {
+        let (angle, slope) = field.angle_and_slope(&self.patches.span, self.fine(point));
         (angle, slope * self.unit())
     }
 
     /// Whether the amount of the angle is below one half, so many cells around a point, by the size of patches alone.
-    fn are_minor(&self, point: [u32; 3], radius: f64) -> bool {
-        let at = DVec3::from(self.fine(point).map(f64::from));
-        self.patches.span.is_minor(at, radius * self.unit())
+    fn are_minor(&self, field: &Field, point: [u32; 3], radius: f64) -> bool {
+        field.is_minor(&self.patches.span, self.place(point), radius * self.unit())
     }
 
     /// Bounds of the angle's derivatives by the cell, so many cells around a point.
-    fn steepness(&self, point: [u32; 3], radius: f64) -> [f64; 2] {
-        let (at, unit) = (DVec3::from(self.fine(point).map(f64::from)), self.unit());
-        let [first, second] = self.patches.span.steepness(at, radius * unit);
+    fn steepness(&self, field: &Field, point: [u32; 3], radius: f64) -> [f64; 2] {
+        let unit = self.unit();
+        let [first, second] = field.steepness(&self.patches.span, self.place(point), radius * unit);
         [first * unit, second * unit * unit]
     }
 
     /// Inside points of a rough brick from its whole numbers, and ties.
-    fn inside(&self, brick: Key, numbers: &[[i32; 64]]) -> (Plane, Vec<Local>) {
+    fn inside(&self, parts: &Parts, brick: Key, numbers: &[[i32; 64]]) -> (Plane, Vec<Local>) {
         let edges = self.hits.edges();
         let net = edges.find(brick).map(|place| Net::of(self.hits, &edges.bricks()[place])).unwrap_or_default();
         let [x, y, z] = self.patches.hits.edges().brick_or_nothing(Some(brick)).crossed;
         let mut rough = Rough {
             angles: self,
+            field: self.of_brick(parts, brick),
             origin: lattice_point(edges.depth(), brick),
             numbers,
             net,
@@ -369,16 +430,16 @@ impl<'a> Angles<'a> {
     }
 
     /// Where and how steeply w passes one half on the edge that starts at `start`.
-    fn sample(&self, axis: Axis, start: [u32; 3], with_normals: bool) -> Sample {
+    fn sample(&self, field: &Field, axis: Axis, start: [u32; 3], with_normals: bool) -> Sample {
         let a = axis.index();
         let mut middle = self.fine(start);
         middle[a] += 1 << (self.shift - 1);
-        let (angle, slope) = self.patches.span.angle_and_slope(middle);
+        let (angle, slope) = field.angle_and_slope(&self.patches.span, middle);
         let slope = slope * self.unit();
         // Up to a whole number: the nearest that is possible.
         let above = angle - THRESHOLD - (angle - THRESHOLD).round();
         let straight = 0.5 - above / slope[a];
-        let position = if (-0.5..=1.5).contains(&straight) { straight } else { self.between(axis, start) };
+        let position = if (-0.5..=1.5).contains(&straight) { straight } else { self.between(field, axis, start) };
         let offset = (position.clamp(0.0, 1.0) * 65535.0) as u16;
         if !with_normals {
             return Sample::new(offset, 0);
@@ -393,11 +454,11 @@ impl<'a> Angles<'a> {
     }
 
     /// The same by values at both ends: next to the boundary.
-    fn between(&self, axis: Axis, start: [u32; 3]) -> f64 {
+    fn between(&self, field: &Field, axis: Axis, start: [u32; 3]) -> f64 {
         let mut end = start;
         end[axis.index()] += 1;
-        let from = self.at(start);
-        let to = self.at(end);
+        let from = self.at(field, start);
+        let to = self.at(field, end);
         let to = to + (from - to).round();
         let passed = (0.5 * (from + to) - THRESHOLD).round() + THRESHOLD;
         let position = (passed - from) / (to - from);
@@ -408,6 +469,8 @@ impl<'a> Angles<'a> {
 /// A rough brick at work.
 struct Rough<'a> {
     angles: &'a Angles<'a>,
+    /// What the brick sees.
+    field: Field,
     origin: [u32; 3],
     numbers: &'a [[i32; 64]],
     /// Jumps of the surface.
@@ -427,24 +490,26 @@ impl Rough<'_> {
         let at = self.point(middle);
         let radius = f64::from(HALF) * 3f64.sqrt();
         let locals = (0..64u32).map(|i| [low[0] + (i >> 4), low[1] + (i >> 2 & 3), low[2] + (i & 3)]);
-        if !locals.clone().any(|[x, y, z]| self.spanned.get(Local::new(x, y, z))) && self.angles.are_minor(at, radius) {
+        if !locals.clone().any(|[x, y, z]| self.spanned.get(Local::new(x, y, z)))
+            && self.angles.are_minor(&self.field, at, radius)
+        {
             for local in locals {
                 self.decide(local, f64::from(self.number(local)) - THRESHOLD, 0.0);
             }
             return;
         }
-        let [_, second] = self.angles.steepness(at, radius);
+        let [_, second] = self.angles.steepness(&self.field, at, radius);
         let reach = |squared: f64| 0.5 * second * squared + ERROR;
         if reach(radius * radius) > MOST {
             let span = &self.angles.patches.span;
-            let angles = self.view.angles(span, self.angles.fine(at), 1 << self.angles.shift);
+            let angles = self.view.angles(span, &self.field, self.angles.fine(at), 1 << self.angles.shift);
             for (local, angle) in locals.zip(angles) {
                 let above = f64::from(self.number(local)) + f64::from(angle) - THRESHOLD;
                 self.decide(local, above, VIEW_ERROR);
             }
             return;
         }
-        let (angle, slope) = self.angles.tangent(at);
+        let (angle, slope) = self.angles.tangent(&self.field, at);
         let number = self.number(middle);
         for local in locals {
             let from_middle = DVec3::from(std::array::from_fn(|a| f64::from(local[a]) - f64::from(middle[a])));
@@ -493,7 +558,7 @@ impl Rough<'_> {
     /// Looks at one point.
     fn point_itself(&mut self, at: [u32; 3]) {
         let local = Local::new(at[0], at[1], at[2]);
-        let above = f64::from(self.number(at)) + self.angles.at(self.point(at)) - THRESHOLD;
+        let above = f64::from(self.number(at)) + self.angles.at(&self.field, self.point(at)) - THRESHOLD;
         if above.abs() <= ERROR {
             self.ties.push(local);
         }
@@ -506,6 +571,7 @@ impl Rough<'_> {
 /// What becomes of the points of a brick.
 struct Points<'a> {
     angles: &'a Angles<'a>,
+    parts: &'a Parts,
     key: Key,
     /// The least number that is inside; none in a rough brick.
     least: Option<i32>,
@@ -524,7 +590,7 @@ impl Layer<(Plane, Vec<Local>)> for Points<'_> {
     fn end(self) -> (Plane, Vec<Local>) {
         match self.least {
             Some(_) => (self.inside, Vec::new()),
-            None => self.angles.inside(self.key, &self.numbers),
+            None => self.angles.inside(self.parts, self.key, &self.numbers),
         }
     }
 }

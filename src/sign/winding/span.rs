@@ -11,38 +11,34 @@
 //! What the gradient of w is depends on the boundary only (the law of Biot and Savart): so the chains' lengths and distances bound by how
 //! much w changes within a ball.
 //!
-//! Nodes lie in depth-first order, and each knows where the next is that is not below it: walking the tree needs no stack.
+//! Nodes lie in depth-first order, and each knows where the next is that is not below it: walking the tree needs no stack. How the surface is
+//! seen from a point, and from all points of a cell, is told by `Field`.
 //!
 //! Where a point lies on the plane of a triangle, it counts as moved by the same (e, e^2, e^3) as in the [rasteriser](crate::geom::raster):
 //! so whole numbers from hits of P and angles of P jump at the same places.
 //!
-//! Cost: 110 bytes an edge of the boundary; 0.3 to 3 us a point, and little more with the gradient.
+//! Cost: 110 bytes an edge of the boundary.
 
 use super::boundary::Corner;
+use super::polynomial::Source;
 use crate::geom::raster::FineTriangle;
-use crate::geom::triangle::closest_on;
 use crate::grid::key::interleave;
 use glam::{DMat3, DVec3};
-use std::f64::consts::PI;
 
-/// A chain is a dipole and a quadrupole for points beyond so many times its radius.
-const FAR: f64 = 4.0;
-/// So far may [`Span::angle`] be off, as a part of the whole sphere.
-pub(super) const ERROR: f64 = 5e-4;
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Of a chain with its part of the surface, or of several rings. Lengths are in fixed-point units.
 #[derive(Debug)]
 pub(super) struct Node {
-    pub(super) centre: [f32; 3],
+    centre: [f32; 3],
     /// All corners are that near.
     pub(super) radius: f32,
     /// Vector area.
     area: [f32; 3],
     /// Of the edges.
-    length: f32,
+    pub(super) length: f32,
     /// Sum of the areas of all triangles.
-    extent: f32,
+    pub(super) extent: f32,
     /// Integral of (place - centre) times normal: xx, yy, zz, and what yz, zx, xy come to on both sides of the diagonal.
     moment: [f32; 6],
     /// Place of the next node that is not below this one.
@@ -50,7 +46,7 @@ pub(super) struct Node {
     /// The node's own triangle, or [`NONE`].
     pub(super) triangle: u32,
     /// Which of the triangle's sides are edges of the boundary.
-    sides: [bool; 3],
+    pub(super) sides: [bool; 3],
 }
 
 /// What is summed up from below.
@@ -195,126 +191,21 @@ impl Span {
         };
         sum
     }
-
-    /// The winding number of the surface at a point: its solid angle over that of the sphere.
-    pub(super) fn angle(&self, at: Corner) -> f64 {
-        self.sum::<false>(at).0
-    }
-
-    /// The winding number, and how it changes for each fixed-point unit.
-    pub(super) fn angle_and_slope(&self, at: Corner) -> (f64, DVec3) {
-        self.sum::<true>(at)
-    }
-
-    fn sum<const SLOPE: bool>(&self, at: Corner) -> (f64, DVec3) {
-        let p = position(at);
-        let (mut angle, mut slope) = (0.0, DVec3::ZERO);
-        let mut i = 0;
-        while let Some(node) = self.nodes.get(i) {
-            let r = DVec3::from(node.centre.map(f64::from)) - p;
-            let r2 = r.length_squared();
-            let near = FAR * f64::from(node.radius);
-            if r2 > near * near {
-                let (a, s) = node.expansion::<SLOPE>(r, r2);
-                angle += a;
-                slope += s;
-                if SLOPE && node.triangle != NONE && !node.sides[2] {
-                    // The chord of the chain, as a side of the triangle above.
-                    let [from, _, to] = self.triangles[node.triangle as usize].map(|corner| position(corner) - p);
-                    slope += slope_of_edge(from, to);
-                }
-                i = node.skip as usize;
-                continue;
-            }
-            if node.triangle != NONE {
-                let triangle = &self.triangles[node.triangle as usize];
-                angle += solid_angle(triangle, at);
-                if SLOPE {
-                    // Of other sides the triangles below have the reverse.
-                    let [a, b, c] = triangle.map(|corner| position(corner) - p);
-                    for ([from, to], _) in [[a, b], [b, c], [c, a]].into_iter().zip(node.sides).filter(|side| side.1) {
-                        slope += slope_of_edge(from, to);
-                    }
-                }
-            }
-            i += 1;
-        }
-        let whole = 4.0 * PI;
-        (angle / whole, slope / whole)
-    }
-
-    /// Whether the amount of the winding number is below one half in all of a ball: how large the surface is, and how far, may tell so.
-    pub(super) fn is_minor(&self, centre: DVec3, radius: f64) -> bool {
-        // Of all round a point, an area takes up at most its share of the sphere on which it lies, and a plane half.
-        let share = |area: f64, distance: f64| area / (4.0 * PI * distance * distance);
-        let mut sum = ERROR;
-        let mut i = 0;
-        while let Some(node) = self.nodes.get(i) {
-            let own = f64::from(node.radius);
-            let distance = DVec3::from(node.centre.map(f64::from)).distance(centre) - own - radius;
-            if distance > 2.0 * own {
-                sum += share(f64::from(node.extent), distance);
-                i = node.skip as usize;
-            } else {
-                if node.triangle != NONE {
-                    let triangle = self.triangles[node.triangle as usize].map(position);
-                    let distance = closest_on(&triangle, centre).distance(centre) - radius;
-                    let [a, b, c] = triangle;
-                    sum += if distance > 0.0 {
-                        share(0.5 * (b - a).cross(c - a).length(), distance).min(0.5)
-                    } else {
-                        0.5
-                    };
-                }
-                i += 1;
-            }
-            if sum >= 0.5 {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Bounds of the first and of the second derivatives of the winding number in a ball, in any direction, for each fixed-point unit.
-    /// Infinite where the boundary comes into the ball.
-    pub(super) fn steepness(&self, centre: DVec3, radius: f64) -> [f64; 2] {
-        let (mut first, mut second) = (0.0, 0.0);
-        let mut i = 0;
-        while let Some(node) = self.nodes.get(i) {
-            let own = f64::from(node.radius);
-            let distance = DVec3::from(node.centre.map(f64::from)).distance(centre) - own - radius;
-            if distance > 2.0 * own {
-                // Chains may be folded: then their length is more than that of a line.
-                let length = f64::from(node.length);
-                first += length / (4.0 * PI * distance * distance);
-                second += length / (2.0 * PI * distance * distance * distance);
-                i = node.skip as usize;
-                continue;
-            }
-            if node.triangle != NONE {
-                let [a, b, c] = self.triangles[node.triangle as usize].map(position);
-                for (side, _) in [[a, b], [b, c], [c, a]].into_iter().zip(node.sides).filter(|side| side.1) {
-                    let distance = distance_to(side, centre) - radius;
-                    if distance <= 0.0 {
-                        return [f64::INFINITY; 2];
-                    }
-                    // By the law of Biot and Savart, of a length at this distance, or of a straight line that passes there.
-                    let share = (side[0].distance(side[1]) / (2.0 * distance)).min(1.0) / (PI * distance);
-                    first += 0.5 * share;
-                    second += share / distance;
-                }
-            }
-            i += 1;
-        }
-        [first, second]
-    }
 }
 
 impl Node {
+    pub(super) fn centre(&self) -> DVec3 {
+        DVec3::from(self.centre.map(f64::from))
+    }
+
+    /// What it is from afar.
+    pub(super) fn source(&self) -> Source {
+        Source { area: DVec3::from(self.area.map(f64::from)), moment: self.moment.map(f64::from) }
+    }
+
     /// Solid angle and its slope at a point from which the centre is at `r`.
     pub(super) fn expansion<const SLOPE: bool>(&self, r: DVec3, r2: f64) -> (f64, DVec3) {
-        let area = DVec3::from(self.area.map(f64::from));
-        let [xx, yy, zz, yz, zx, xy] = self.moment.map(f64::from);
+        let Source { area, moment: [xx, yy, zz, yz, zx, xy] } = self.source();
         let i2 = 1.0 / r2;
         let i3 = i2 * i2.sqrt();
         // The moment from both sides.
@@ -333,13 +224,6 @@ impl Node {
         let of_quadrupole = r * (15.0 * rmr * i2 * i2 - 3.0 * trace * i2) - m * (6.0 * i2);
         (angle, -i3 * (of_dipole + of_quadrupole))
     }
-}
-
-/// Distance from a segment to a point.
-fn distance_to([a, b]: [DVec3; 2], p: DVec3) -> f64 {
-    let along = (p - a).dot(b - a) / (b - a).length_squared();
-    // Of a point, if it has no length.
-    if along.is_nan() { p.distance(a) } else { p.distance(a.lerp(b, along.clamp(0.0, 1.0))) }
 }
 
 /// The solid angle of a triangle, positive where it turns its back (van Oosterom and Strackee 1983).
@@ -387,12 +271,7 @@ fn side(triangle: &FineTriangle, at: Corner) -> f64 {
     if height == 0 { moved as f64 } else { height.signum() as f64 }
 }
 
-/// The slope of a triangle's solid angle, from its corners relative to the point: that of a current round its edges.
-pub(super) fn slope_of([a, b, c]: [DVec3; 3]) -> DVec3 {
-    slope_of_edge(a, b) + slope_of_edge(b, c) + slope_of_edge(c, a)
-}
-
-fn slope_of_edge(a: DVec3, b: DVec3) -> DVec3 {
+pub(super) fn slope_of_edge(a: DVec3, b: DVec3) -> DVec3 {
     let (la, lb) = (a.length(), b.length());
     let below = la * lb * (la * lb + a.dot(b));
     // On the line itself there is none.
@@ -401,65 +280,9 @@ fn slope_of_edge(a: DVec3, b: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::field::distance_to;
     use super::*;
-    use crate::mesh::chance::Chance;
     use proptest::prelude::*;
-
-    /// A closed walk round the middle of the root, with corners up to `jag` off.
-    fn ring(corners: usize, jag: f64, mut chance: impl FnMut() -> f64) -> Vec<Corner> {
-        let radius = f64::from(1 << 23);
-        let corner = |i: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * i as f64 / corners as f64).sin_cos();
-            let mut off = || 1.0 + jag * (chance() - 0.5);
-            let p = [cos * off(), 0.6 * sin + 0.5 * cos * off(), 0.7 * sin * off()];
-            p.map(|c| (f64::from(1 << 25) + c * radius) as i32)
-        };
-        (0..corners).map(corner).collect()
-    }
-
-    fn plain(span: &Span, at: Corner) -> f64 {
-        span.triangles.iter().map(|t| solid_angle(t, at)).sum::<f64>() / (4.0 * PI)
-    }
-
-    #[test]
-    fn chains_from_afar_are_what_their_triangles_are() {
-        let mut random = Chance(1);
-        let mut chance = || random.unit();
-        for (corners, jag) in
-            [(3, 0.0), (4, 0.0), (7, 0.4), (100, 0.0), (100, 0.1), (1000, 0.0), (1000, 0.02), (1001, 0.3)]
-        {
-            let span = Span::new(vec![ring(corners, jag, &mut chance)]);
-            assert_eq!(span.triangles.len(), corners - 2);
-            let (mut worst, mut steep, mut minor) = (0f64, 0f64, 0);
-            for _ in 0..2000 {
-                let at: Corner = std::array::from_fn(|_| (1 << 24) + (chance() * f64::from(1 << 25)) as i32);
-                let (angle, slope) = span.angle_and_slope(at);
-                assert_eq!(angle, span.angle(at));
-                if span.is_minor(position(at), 1000.0) {
-                    assert!(angle.abs() < 0.5);
-                    minor += 1;
-                }
-                worst = worst.max((angle - plain(&span, at)).abs());
-                // Over a step that is short, but much longer than roundings.
-                let step = 1 << 12;
-                for axis in 0..3 {
-                    let mut beyond = at;
-                    beyond[axis] += step;
-                    let rise = plain(&span, beyond) - plain(&span, at);
-                    let [first, second] = span.steepness(position(at), f64::from(step));
-                    if first.is_finite() && rise.abs() < 0.5 {
-                        let slack = 1e-9 + 0.5 * second * f64::from(step).powi(2);
-                        assert!(rise.abs() <= first * f64::from(step) + 1e-9, "{rise} {first}");
-                        steep = steep.max((rise - slope[axis] * f64::from(step)).abs() - slack);
-                    }
-                }
-            }
-            println!("{corners} corners, jag {jag}: worst {worst:.2e}, slope off by {steep:.2e}");
-            assert!(minor > 500, "{corners} corners, jag {jag}: {minor}");
-            assert!(worst < ERROR, "{corners} corners, jag {jag}: {worst}");
-            assert!(steep < 0.1 * ERROR, "{corners} corners, jag {jag}: {steep}");
-        }
-    }
 
     proptest! {
         /// On a plane of a triangle too, angles jump where the rasteriser's lattice says.
