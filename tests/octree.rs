@@ -68,7 +68,7 @@ fn a02_a03_a04_the_finest_level_is_a_level_like_others() {
 fn a05_points_on_far_boundaries_have_a_leaf_that_holds_them() {
     let (min, max) = (DVec3::new(0.1, -7.3, 1e3), DVec3::new(0.4, 11.1, 1e3 + 0.7));
     let domain = Domain::new(min, max, [7, 3, 5]).expect("a box");
-    let mut tree = domain.background(|_| ());
+    let mut tree: LinearOctree<()> = domain.background().map(|cell| (cell, ())).collect();
     for step in 0..=210u32 {
         let share = DVec3::splat(f64::from(step) / 210.0);
         for p in [min + (max - min) * share, DVec3::new(max.x, min.y, max.z), max] {

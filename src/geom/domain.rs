@@ -1,7 +1,7 @@
 //! [`Domain`]: a box in space over the lattice of an octree, as a background grid of cells.
 //!
 //! The box is divided into `I x J x K` BACKGROUND CELLS, its cells of level 0, which need not be cubes. The grid lies at the low corner of
-//! the root cube of a [`LinearOctree`], whose own level `b` is the first with room for it, `2^b >= max(I, J, K)`; a cell of level `l` of
+//! the root cube of a [`LinearOctree`](crate::octree::LinearOctree), whose own level `b` is the first with room for it, `2^b >= max(I, J, K)`; a cell of level `l` of
 //! the domain is a cell of level `b + l` of the root, and 18 - b levels remain. What of the root lies beyond the grid has no leaves.
 //!
 //! Lattice points are the truth: a coordinate in space belongs to the last lattice point whose own coordinate,
@@ -12,7 +12,6 @@
 use crate::error::{Error, Result, Short};
 use crate::grid::key::{MAX_LEVEL, SIDE};
 use crate::grid::{Axis, Key};
-use crate::octree::LinearOctree;
 use glam::DVec3;
 
 /// The least distance of lattice points, relative to the largest coordinate: sixteen units in the last place.
@@ -37,9 +36,10 @@ pub struct Outside {
 /// ```
 /// use zmend::geom::Domain;
 /// use zmend::glam::DVec3;
+/// use zmend::octree::LinearOctree;
 ///
 /// let domain = Domain::new(DVec3::ZERO, DVec3::new(3.0, 1.0, 0.5), [3, 2, 1])?;
-/// let tree = domain.background(|_| ());
+/// let tree: LinearOctree<()> = domain.background().map(|cell| (cell, ())).collect();
 /// assert_eq!((tree.len(), domain.max_level()), (6, 16));
 /// let point = domain.locate(DVec3::new(3.0, 0.6, 0.1))?; // the far boundary is inside
 /// let (leaf, ()) = tree.locate(point).unwrap();
@@ -147,11 +147,11 @@ impl Domain {
         Key::cell(self.base + level, position).filter(|_| is_inside)
     }
 
-    /// All background cells as leaves, with a record each. O(n).
-    pub fn background<T>(&self, mut record: impl FnMut(Key) -> T) -> LinearOctree<T> {
-        let [nx, ny, nz] = self.cells;
-        let places = (0..nx).flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])));
-        places.filter_map(|place| self.cell(0, place)).map(|cell| (cell, record(cell))).collect()
+    /// All background cells, z fastest: the leaves of a tree that covers the domain.
+    pub fn background(&self) -> impl Iterator<Item = Key> + use<> {
+        let (base, [nx, ny, nz]) = (self.base, self.cells);
+        let places = (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])));
+        places.filter_map(move |place| Key::cell(base, place))
     }
 
     /// The coordinates of a lattice point. Those of the box's own corners are exactly its own. Beyond the box, coordinates go on.
@@ -165,7 +165,7 @@ impl Domain {
     }
 
     /// The lattice point of a point in space: along each axis the last one that is not above it, but below the far boundary, so that
-    /// points there are in the last cells. What [`LinearOctree::locate`] wants.
+    /// points there are in the last cells. What [`LinearOctree::locate`](crate::octree::LinearOctree::locate) wants.
     ///
     /// # Errors
     ///
@@ -215,6 +215,7 @@ impl Domain {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::octree::LinearOctree;
     use proptest::prelude::*;
 
     fn domain() -> impl Strategy<Value = Domain> {
@@ -241,7 +242,7 @@ mod tests {
         fn points_lie_in_their_cells(domain in domain(), share in [0.0..=1.0, 0.0..=1.0, 0.0..=1.0], level in 0..6u32) {
             let p = domain.min().lerp(domain.max(), 1.0) * DVec3::from_array(share) + domain.min() * (1.0 - DVec3::from_array(share));
             let p = p.clamp(domain.min(), domain.max());
-            let tree = domain.background(|_| ());
+            let tree: LinearOctree<()> = domain.background().map(|cell| (cell, ())).collect();
             prop_assert_eq!(tree.len() as u32, domain.cells().iter().product::<u32>());
             let (leaf, ()) = tree.locate(domain.locate(p).expect("inside")).expect("a background cell");
             prop_assert_eq!(domain.level(leaf), Some(0));
