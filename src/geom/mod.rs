@@ -1,9 +1,11 @@
-//! Floating-point and fixed-point geometry: the frame between model and lattice, exact rasterisation, QEF.
+//! Floating-point and fixed-point geometry: the frame and the domain between model and lattice, exact rasterisation, QEF.
 
+pub mod domain;
 pub mod frame;
 pub mod normal;
 pub mod qef;
 pub mod raster;
 pub(crate) mod triangle;
 
+pub use domain::{Domain, Outside};
 pub use frame::{Cube, Frame};

@@ -33,6 +33,7 @@
 //! before the cell, those in child 7 after it. Sort by [`Key::depth_first_rank`] for the order in which parents come
 //! before their children.
 
+mod block;
 mod incidence;
 mod morton;
 

@@ -4,6 +4,7 @@
 //! every level is named by one packed 64-bit [`Key`], and whatever incidence is needed is arithmetic on keys.
 
 pub mod axis;
+pub(crate) mod block;
 pub mod brick;
 pub mod cases;
 pub mod flood;

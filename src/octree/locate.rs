@@ -1,21 +1,20 @@
 //! Leaf search: which leaf holds a point, or a cell.
 
-use super::LinearOctree;
+use super::{CellState, LinearOctree};
 use crate::grid::Key;
 use crate::grid::key::{MAX_LEVEL, SIDE, interleave};
 
 /// Leaf search.
 ///
-/// Only leaves are in the map, so whether a point's leaf is finer or coarser than a cell that is absent cannot be told,
-/// and the binary search over levels that a map with all ancestors would allow is none here. Instead each level that
-/// HAS leaves is probed at most once: `L` levels cost 1 to `L` probes, often three or four in a mesh's octree, at most
-/// 19.
+/// A probe tells of a cell whether it is a leaf, has leaves inside, or lies in a larger leaf or nowhere. So the level of the leaf at a
+/// point is found by bisection of the levels that HAVE leaves, after a look at the finest, where most leaves are: at most 6 probes, and
+/// those of coarse levels hit few blocks, which are in the cache.
 impl<T> LinearOctree<T> {
     /// The leaf that holds a point given in lattice coordinates, 0 ..= 2^19, with its record.
     ///
     /// A leaf holds its low faces but not its high ones, so that a point has one leaf only; the high faces of the root
-    /// belong to the leaves inside them. `None` where there is no leaf, and outside the root. Up to one probe for each
-    /// level with leaves, from fine to coarse.
+    /// belong to the leaves inside them. `None` where there is no leaf, and outside the root. O(log L) probes with leaves of L
+    /// levels.
     ///
     /// ```
     /// use zmend::grid::Key;
@@ -26,58 +25,55 @@ impl<T> LinearOctree<T> {
     /// assert_eq!(tree.locate([1, 2, u32::MAX]), None);
     /// ```
     pub fn locate(&self, point: [u32; 3]) -> Option<(Key, &T)> {
-        self.finest_around(code_of(point)?, self.levels.occupied)
+        let levels = self.levels.occupied;
+        self.search(code_of(point)?, levels, levels.checked_ilog2()?)
     }
 
     /// As [`locate`](LinearOctree::locate), for a point whose leaf is likely of about the size of the cell `hint`, such
-    /// as the leaf of the previous point on a path: levels are probed by their distance from the hint's. Any cell will
-    /// do as hint. For points along a line it takes a third of the time: 21 against 62 ns in `cargo bench --bench octree`.
+    /// as the leaf of the previous point on a path: the hint's level and the next one are probed first. Any cell will do as hint.
+    /// One or two probes where it is right within a level.
     pub fn locate_from(&self, hint: Key, point: [u32; 3]) -> Option<(Key, &T)> {
-        self.nearest_around(code_of(point)?, hint.level().unwrap_or(MAX_LEVEL))
+        self.search(code_of(point)?, self.levels.occupied, hint.level().unwrap_or(MAX_LEVEL))
     }
 
-    /// The leaf that is this cell or holds it, with its record. Up to one probe for each level with leaves, from the
-    /// cell's own level to the root. Domain: cells.
+    /// The leaf that is this cell or holds it, with its record. One probe if it is, else O(log L) with leaves of L coarser levels.
+    /// Domain: cells.
     pub fn leaf_over(&self, cell: Key) -> Option<(Key, &T)> {
-        let level = cell.level().unwrap_or(0);
-        self.finest_around(cell.code(), self.levels.occupied & ((2 << level) - 1))
+        let level = cell.level()?;
+        self.search(cell.code(), self.levels.occupied & ((2 << level) - 1), level)
     }
 
-    /// The leaf around an interleaved point of the half-open root, where levels near `level` are the most likely.
-    pub(super) fn nearest_around(&self, code: u64, level: u32) -> Option<(Key, &T)> {
-        let mut levels = self.levels.occupied;
-        while levels != 0 {
-            // A coarser level only if it is nearer than any finer one.
-            let (coarser, finer) = (levels & ((1 << level) - 1), levels >> level);
-            let level = match (coarser.checked_ilog2(), finer.trailing_zeros()) {
-                (Some(coarser), down) if finer == 0 || level - coarser < down => coarser,
-                (_, down) => level + down,
+    /// The leaf around an interleaved point of the half-open root, among those of `levels`; `level` is the most likely. Looks there,
+    /// then bisects; but where it is not the finest, at the next level in the direction the answer gives first.
+    pub(super) fn search(&self, code: u64, mut levels: u32, mut level: u32) -> Option<(Key, &T)> {
+        let mut is_first = levels >> level > 1;
+        loop {
+            let cell = Key::around(code, level);
+            let finer = match self.state(cell) {
+                CellState::Leaf(record) => return Some((cell, record)),
+                CellState::Refined => true,
+                CellState::Absent => false,
             };
-            levels ^= 1 << level;
-            let cell = Key::around(code, level);
-            if let Some(record) = self.get(cell) {
-                return Some((cell, record));
-            }
+            let below = (2 << level) - 1;
+            levels &= if finer { !below } else { below >> 1 };
+            level = match (is_first, finer) {
+                (true, true) if levels != 0 => levels.trailing_zeros(),
+                (true, false) => levels.checked_ilog2()?,
+                _ => middle(levels)?,
+            };
+            is_first = false;
         }
-        None
-    }
-
-    /// The finest leaf around an interleaved point, among these levels.
-    fn finest_around(&self, code: u64, mut levels: u32) -> Option<(Key, &T)> {
-        while levels != 0 {
-            let level = levels.ilog2();
-            let cell = Key::around(code, level);
-            if let Some(record) = self.get(cell) {
-                return Some((cell, record));
-            }
-            levels ^= 1 << level;
-        }
-        None
     }
 }
 
+/// A level half-way between the coarsest and the finest of a set, if it is not empty.
+fn middle(levels: u32) -> Option<u32> {
+    let half = u32::midpoint(levels.trailing_zeros(), levels.checked_ilog2()?);
+    Some((levels & ((2 << half) - 1)).ilog2())
+}
+
 /// The interleaved coordinates, with those on the high faces of the root moved inside. `None` outside the root.
-fn code_of(point: [u32; 3]) -> Option<u64> {
+pub(super) fn code_of(point: [u32; 3]) -> Option<u64> {
     point.iter().all(|&x| x <= SIDE).then(|| interleave(point.map(|x| x.min(SIDE - 1))))
 }
 

@@ -1,8 +1,17 @@
-//! [`LinearOctree`]: an octree without pointers, a hash map from the [`Key`] of each leaf to its record.
+//! [`LinearOctree`]: an octree without pointers, a hash map from packed keys to blocks of leaves.
 //!
-//! Only leaves are stored. Parents, children and neighbours are arithmetic on keys, so that a tree costs its records, 8
-//! bytes of key and one control byte per slot, and changing a leaf never touches another one. The tree knows which
-//! levels have leaves and how many; that keeps searches to the levels that occur.
+//! Only leaves have records. Parents, children and neighbours are arithmetic on keys. Leaves lie in blocks of 4 x 4 x 4 cells of a
+//! level: two words of bits tell which cells are leaves and which have leaves inside, and the records follow each other without
+//! gaps. So a leaf costs its record and 3 to 5 bytes, one probe answers for 64 cells, and a search for the leaf at a point bisects the
+//! levels.
+//!
+//! | to | there is |
+//! |---|---|
+//! | make and change trees | [`insert`](LinearOctree::insert), [`build`](LinearOctree::build), [`refine`](LinearOctree::refine), [`coarsen`](LinearOctree::coarsen), [`balance`](LinearOctree::balance), [`of_points`](LinearOctree::of_points) |
+//! | find leaves | [`locate`](LinearOctree::locate), [`leaves_in_box`](LinearOctree::leaves_in_box), [`leaves_within`](LinearOctree::leaves_within), [`along_ray`](LinearOctree::along_ray), [`around`](LinearOctree::around), [`neighbours`](LinearOctree::neighbours) |
+//! | go through all | [`iter_z`](LinearOctree::iter_z), [`iter_by_level`](LinearOctree::iter_by_level), [`par_iter_z`](LinearOctree::par_iter_z), [`visit_dual`](LinearOctree::visit_dual), [`face_regions`](LinearOctree::face_regions) |
+//! | have values at corners | [`NodalOctree`] |
+//! | keep | [`to_bytes`](LinearOctree::to_bytes), [`from_bytes`](LinearOctree::from_bytes), and `serde` with the feature of that name |
 //!
 //! ```
 //! use zmend::grid::{Corner, Face, Key};
@@ -20,18 +29,27 @@
 //! assert_eq!(beside, [0, 1, 2, 3].map(|i| first.child(Corner::ALL[4 + i])));
 //! ```
 
+mod balance;
+mod blocks;
+mod build;
+mod bytes;
 pub(crate) mod cells;
 pub mod compact;
 pub mod components;
 pub mod crossings;
+mod dual;
 pub mod edited;
+mod face_regions;
 pub mod hits;
 mod locate;
 mod neighbour;
+pub mod nodes;
 #[cfg(test)]
 mod oracle;
 pub(crate) mod point_set;
 pub mod points;
+mod query;
+mod refine;
 pub mod regions;
 pub mod segments;
 pub mod signed;
@@ -42,23 +60,31 @@ use std::fmt;
 
 use ahash::RandomState;
 use hashbrown::HashMap;
-use hashbrown::hash_map::Entry;
 
 use crate::grid::Key;
+use crate::grid::block::Cells;
 use crate::grid::key::MAX_LEVEL;
 
+pub use blocks::CellState;
 pub use compact::CompactOctree;
 pub use crossings::Crossings;
+pub use dual::{Dual, DualPiece};
 pub use edited::EditedOctree;
 pub use hits::OrientedHits;
 pub use neighbour::Neighbours;
+pub use nodes::NodalOctree;
 pub use points::{CellPoints, StoredPoints};
+pub use query::Crossed;
+pub use refine::{Balance, RefineError};
 pub use signed::SignedOctree;
 pub use traverse::LeavesIn;
 pub use validate::Violation;
 
 /// The hash never differs between runs: 256 bits of the fraction of pi.
 const SEEDS: [u64; 4] = [0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344, 0xa409_3822_299f_31d0, 0x082e_fa98_ec4e_6c89];
+
+/// Leaves a block for which a table has room when it is made: those of real surfaces have twice as many.
+const LEAVES_A_BLOCK: usize = 16;
 
 /// A set of cells that do not overlap, the leaves, each with a record of type `T`.
 ///
@@ -68,9 +94,10 @@ const SEEDS: [u64; 4] = [0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344, 0xa409_38
 ///
 /// # Memory
 ///
-/// A slot of the hash table takes `size_of::<(Key, T)>() + 1` bytes: 9 with an empty record, 17 with one of 1 to 8
-/// bytes. The number of slots is a power of two and at most 7/8 of them are used, so a leaf costs between 8/7 and 16/7
-/// slots. See [`allocated_bytes`](LinearOctree::allocated_bytes).
+/// A block of up to 64 leaves of a level takes 49 bytes in a hash table, and an allocation with room for its records: up to seven
+/// more than it has, until [`shrink_to_fit`](LinearOctree::shrink_to_fit). Blocks near a surface have 25 to 30 leaves, which makes 3
+/// to 5 bytes a leaf beside its record; trees that cover the root have at least 7 leaves a block. A leaf alone, far from all others,
+/// costs a block of its own and one of each coarser level. See [`allocated_bytes`](LinearOctree::allocated_bytes).
 ///
 /// # Order
 ///
@@ -78,8 +105,22 @@ const SEEDS: [u64; 4] = [0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344, 0xa409_38
 /// result. The `_z` traversals give Z-order, whatever the history and the number of threads.
 #[derive(Clone)]
 pub struct LinearOctree<T> {
-    leaves: HashMap<Key, T, RandomState>,
+    /// By the name of the block.
+    blocks: HashMap<Key, Block<T>, RandomState>,
     levels: Levels,
+    /// For how many records there is room in all blocks.
+    room: usize,
+}
+
+/// The cells of a level in a cube of 4 x 4 x 4 that are leaves or refined. See [`blocks`].
+#[derive(Debug, Clone)]
+struct Block<T> {
+    /// The leaves.
+    leaves: Cells,
+    /// The cells with leaves inside.
+    refined: Cells,
+    /// Those of `leaves`, in order.
+    records: Vec<T>,
 }
 
 impl<T> LinearOctree<T> {
@@ -88,85 +129,77 @@ impl<T> LinearOctree<T> {
         Self::with_capacity(0)
     }
 
-    /// An empty tree with room for so many leaves.
+    /// An empty tree whose table has room for so many leaves, if they lie as near to each other as those along a surface.
     pub fn with_capacity(leaves: usize) -> Self {
         let [a, b, c, d] = SEEDS;
         let hasher = RandomState::with_seeds(a, b, c, d);
-        LinearOctree { leaves: HashMap::with_capacity_and_hasher(leaves, hasher), levels: Levels::default() }
+        let blocks = HashMap::with_capacity_and_hasher(leaves.div_ceil(LEAVES_A_BLOCK), hasher);
+        LinearOctree { blocks, levels: Levels::default(), room: 0 }
     }
 
-    /// Makes room for so many more leaves.
+    /// Makes room for so many more leaves; see [`with_capacity`](LinearOctree::with_capacity).
     pub fn reserve(&mut self, additional: usize) {
-        self.leaves.reserve(additional);
+        self.blocks.reserve(additional.div_ceil(LEAVES_A_BLOCK));
     }
 
     /// Gives back what memory the leaves do not need. O(n) if it moves them.
     pub fn shrink_to_fit(&mut self) {
-        self.leaves.shrink_to_fit();
+        self.blocks.shrink_to_fit();
+        self.blocks.values_mut().for_each(|block| block.records.shrink_to_fit());
+        self.room = self.blocks.values().map(|block| block.records.capacity()).sum();
     }
 
-    /// How many leaves fit without growing.
-    pub fn capacity(&self) -> usize {
-        self.leaves.capacity()
-    }
-
-    /// Bytes held by the table, not counting what records own elsewhere.
+    /// Bytes held by the table and the records, not counting what records own elsewhere. O(1).
     pub fn allocated_bytes(&self) -> usize {
-        self.leaves.allocation_size()
+        self.blocks.allocation_size() + self.room * size_of::<T>()
     }
 
     /// How many leaves there are.
     pub fn len(&self) -> usize {
-        self.leaves.len()
+        self.levels.leaves
     }
 
     /// Whether there is no leaf.
     pub fn is_empty(&self) -> bool {
-        self.leaves.is_empty()
+        self.levels.leaves == 0
     }
 
-    /// Removes all leaves, keeps the memory.
+    /// Removes all leaves; keeps the memory of the table.
     pub fn clear(&mut self) {
-        self.leaves.clear();
+        self.blocks.clear();
+        self.room = 0;
         self.levels = Levels::default();
     }
 
     /// Whether exactly this cell is a leaf. One probe.
     pub fn contains(&self, leaf: Key) -> bool {
-        self.leaves.contains_key(&leaf)
+        self.block_of(leaf).is_some_and(|(block, place)| block.leaves.has(place))
     }
 
     /// The record of exactly this leaf. One probe; see [`leaf_over`](LinearOctree::leaf_over) for a leaf that may be
     /// larger.
     pub fn get(&self, leaf: Key) -> Option<&T> {
-        self.leaves.get(&leaf)
+        let (block, place) = self.block_of(leaf)?;
+        block.get(place)
     }
 
     /// The record of exactly this leaf, to change. One probe.
     pub fn get_mut(&mut self, leaf: Key) -> Option<&mut T> {
-        self.leaves.get_mut(&leaf)
+        self.record_mut(leaf)
     }
 
     /// Makes the cell a leaf, without looking whether it overlaps others; returns the record it had, if it was one. One
-    /// probe.
+    /// probe, and one more for each ancestor that had no leaves yet.
     ///
     /// # Panics
     ///
     /// If the key is not that of a cell.
     pub fn insert(&mut self, cell: Key, record: T) -> Option<T> {
-        assert!(cell.is_cell(), "{cell} cannot be a leaf");
-        let old = self.leaves.insert(cell, record);
-        if old.is_none() {
-            self.levels.add(cell);
-        }
-        old
+        self.put_record(cell, record)
     }
 
-    /// As [`insert`](LinearOctree::insert), but refuses keys that are not cells, and cells inside another leaf. One
-    /// probe for each level with leaves above the cell's.
-    ///
-    /// It does not see leaves INSIDE the cell, which no few probes could tell; there can be none while cells are
-    /// inserted from coarse to fine.
+    /// As [`insert`](LinearOctree::insert), but refuses keys that are not cells, and cells inside or around another leaf. A probe
+    /// more, and a search in the coarser levels.
     ///
     /// # Errors
     ///
@@ -175,45 +208,34 @@ impl<T> LinearOctree<T> {
         if !(cell.is_valid() && cell.is_cell()) {
             return Err(Violation::NotACell { key: cell });
         }
+        if self.state(cell).is_refined() {
+            let (inner, _) = self.leaves_in(cell).next().expect("it has leaves inside");
+            return Err(Violation::Overlap { outer: cell, inner });
+        }
         match self.leaf_over(cell) {
             Some((outer, _)) if outer != cell => Err(Violation::Overlap { outer, inner: cell }),
             _ => Ok(self.insert(cell, record)),
         }
     }
 
-    /// The record of a leaf, made first if the cell is none yet; does not look for overlaps. One probe.
+    /// The record of a leaf, made first if the cell is none yet; does not look for overlaps. Costs as
+    /// [`insert`](LinearOctree::insert).
     ///
     /// # Panics
     ///
     /// If the key is not that of a cell.
     pub fn get_or_insert_with(&mut self, cell: Key, record: impl FnOnce() -> T) -> &mut T {
-        assert!(cell.is_cell(), "{cell} cannot be a leaf");
-        match self.leaves.entry(cell) {
-            Entry::Occupied(leaf) => leaf.into_mut(),
-            Entry::Vacant(slot) => {
-                self.levels.add(cell);
-                slot.insert(record())
-            }
-        }
+        self.record_or_put(cell, record)
     }
 
-    /// Removes exactly this leaf and returns its record. One probe.
+    /// Removes exactly this leaf and returns its record. One probe, and one more for each ancestor that has no leaves left.
     pub fn remove(&mut self, leaf: Key) -> Option<T> {
-        let record = self.leaves.remove(&leaf)?;
-        self.levels.remove(leaf);
-        Some(record)
+        self.take_record(leaf)
     }
 
     /// Keeps the leaves for which the answer is yes, asked in arbitrary order.
-    pub fn retain(&mut self, mut keep: impl FnMut(Key, &mut T) -> bool) {
-        let levels = &mut self.levels;
-        self.leaves.retain(|&leaf, record| {
-            let stays = keep(leaf, record);
-            if !stays {
-                levels.remove(leaf);
-            }
-            stays
-        });
+    pub fn retain(&mut self, keep: impl FnMut(Key, &mut T) -> bool) {
+        self.retain_records(keep);
     }
 
     /// How many leaves have this level; none above 18.
@@ -257,7 +279,10 @@ impl<T> FromIterator<(Key, T)> for LinearOctree<T> {
 /// The same leaves with equal records, whatever the history.
 impl<T: PartialEq> PartialEq for LinearOctree<T> {
     fn eq(&self, other: &Self) -> bool {
-        self.leaves == other.leaves
+        let same = |(&name, block): (&Key, &Block<T>)| {
+            other.blocks.get(&name).is_some_and(|b| b.leaves == block.leaves && b.records == block.records)
+        };
+        self.len() == other.len() && self.blocks.iter().all(same)
     }
 }
 
@@ -276,18 +301,24 @@ struct Levels {
     counts: [usize; MAX_LEVEL as usize + 1],
     /// Bit `l` is set where `counts[l]` is not 0.
     occupied: u32,
+    /// Of all levels.
+    leaves: usize,
 }
 
 impl Levels {
-    fn add(&mut self, leaf: Key) {
-        let level = leaf.level().expect("a leaf is a cell: checked by insert");
-        self.counts[level as usize] += 1;
-        self.occupied |= 1 << level;
+    /// `more` leaves of the level of `cell`.
+    fn add(&mut self, cell: Key, more: usize) {
+        let level = cell.level().expect("a leaf is a cell: checked by insert");
+        self.counts[level as usize] += more;
+        self.leaves += more;
+        self.occupied |= u32::from(more > 0) << level;
     }
 
-    fn remove(&mut self, leaf: Key) {
-        let level = leaf.level().expect("a leaf is a cell: checked by insert");
-        self.counts[level as usize] -= 1;
+    /// `fewer` leaves of the level of `cell`.
+    fn remove(&mut self, cell: Key, fewer: usize) {
+        let level = cell.level().expect("a leaf is a cell: checked by insert");
+        self.counts[level as usize] -= fewer;
+        self.leaves -= fewer;
         if self.counts[level as usize] == 0 {
             self.occupied &= !(1 << level);
         }
@@ -359,12 +390,15 @@ mod tests {
     }
 
     #[test]
-    fn a_leaf_costs_its_record_and_nine_bytes_of_a_slot() {
-        let mut tree: LinearOctree<u64> = LinearOctree::with_capacity(7 << 10);
+    fn a_leaf_costs_its_record_and_little_more() {
+        let mut tree: LinearOctree<u64> = LinearOctree::new();
         tree.extend(Key::ROOT.children().into_iter().flat_map(Key::children).map(|leaf| (leaf, 0)));
-        assert!((7 << 10..8 << 10).contains(&tree.capacity()), "{}", tree.capacity());
-        assert!(tree.allocated_bytes() <= 17 * (8 << 10) + 64, "{}", tree.allocated_bytes());
+        assert_eq!(tree.len(), 64);
         tree.shrink_to_fit();
-        assert!(tree.allocated_bytes() <= 17 * 128 + 64, "{}", tree.allocated_bytes());
+        // A block with leaves, two of refined cells.
+        assert!(tree.allocated_bytes() <= 64 * 8 + 4 * 49 + 32, "{}", tree.allocated_bytes());
+        tree.retain(|_, _| false);
+        tree.shrink_to_fit();
+        assert_eq!((tree.allocated_bytes(), tree.blocks.len()), (0, 0));
     }
 }

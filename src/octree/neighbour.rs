@@ -2,8 +2,7 @@
 
 use std::iter::FusedIterator;
 
-use super::{LeavesIn, LinearOctree};
-use crate::grid::key::MAX_LEVEL;
+use super::{CellState, LeavesIn, LinearOctree};
 use crate::grid::{Direction, Key};
 
 /// Neighbours, found by arithmetic and probes; nothing is stored.
@@ -15,20 +14,24 @@ impl<T> LinearOctree<T> {
     /// neighbour whose boundary meets the face, edge or corner shared with the cell, in Z-order. A larger leaf across
     /// an edge or corner may lie across a face as well. The cell itself may be any cell, a leaf or not.
     ///
-    /// Costs one probe if it has the same size; a probe for each level with leaves between their sizes on both sides if
-    /// it is larger, and when leaves are smaller, also one for each of them and of their ancestors in the neighbour:
-    /// three to six in a balanced tree. Where the space is EMPTY, all cells along the face (edge, corner) down to the
-    /// finest level are looked for: up to 4^d (2^d, 1) probes, `d` levels below the cell. Trees that cover the root
-    /// have no such places. Domain: cells.
+    /// Costs one probe if it has the same size, one or two more if it is twice as large, and where leaves are smaller, one for each of
+    /// them and of their ancestors in the neighbour at most. Domain: cells.
     pub fn neighbours(&self, cell: Key, direction: impl Into<Direction>) -> Neighbours<'_, T> {
         let direction = direction.into();
         let Some(beyond) = cell.toward(direction) else { return Neighbours { whole: None, parts: None } };
         let back = direction.opposite();
-        let level = beyond.level().unwrap_or(MAX_LEVEL);
-        match self.nearest_around(beyond.code_inside(back.corner()), level) {
-            Some(leaf) if leaf.0.size() >= beyond.size() => Neighbours { whole: Some(leaf), parts: None },
-            _ => Neighbours { whole: None, parts: Some(LeavesIn::beside(self, beyond, back)) },
-        }
+        let (whole, parts) = match self.state(beyond) {
+            CellState::Leaf(record) => (Some((beyond, record)), None),
+            CellState::Refined => (None, Some(LeavesIn::beside(self, beyond, back))),
+            CellState::Absent => (self.leaf_around(beyond), None),
+        };
+        Neighbours { whole, parts }
+    }
+
+    /// The leaf that holds a cell which is not in the tree; likely one of the next coarser level.
+    pub(super) fn leaf_around(&self, cell: Key) -> Option<(Key, &T)> {
+        let coarser = self.levels.occupied & ((1 << cell.level()?) - 1);
+        self.search(cell.code(), coarser, coarser.checked_ilog2()?)
     }
 
     /// All leaves other than the cell that touch it, across faces, edges and corners, each once, with their records: by

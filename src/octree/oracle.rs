@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 
-use super::LinearOctree;
+use super::{Balance, LinearOctree};
 use crate::grid::key::SIDE;
-use crate::grid::{Direction, Key};
+use crate::grid::{Axis, Direction, Key};
 
 /// Up to so many lattice points.
 pub(super) fn points(max: usize) -> impl Strategy<Value = Vec<[u32; 3]>> {
@@ -31,6 +31,9 @@ pub(super) fn tree(depth: u32) -> impl Strategy<Value = LinearOctree<u64>> {
     })
 }
 
+/// Every kind.
+pub(super) const BALANCES: [Balance; 4] = [Balance::Off, Balance::Faces, Balance::Edges, Balance::Corners];
+
 /// Least and greatest coordinates.
 type Span = ([u32; 3], [u32; 3]);
 
@@ -56,6 +59,48 @@ impl Oracle {
         let shared = meet(span(cell), beyond);
         let touches = |b: Span| meets(meet(b, shared)) && (0..3).all(|i| meet(b, beyond).0[i] < meet(b, beyond).1[i]);
         self.0.iter().filter(|&&(_, b)| touches(b)).map(|&(leaf, _)| leaf).collect()
+    }
+
+    /// The leaves that share a piece of an element, of its own dimension.
+    pub(super) fn around(&self, element: Key) -> Vec<Key> {
+        let shares = |b: Span| {
+            let (min, max) = meet(b, span(element));
+            meets((min, max))
+                && Axis::ALL.into_iter().all(|a| !element.dir().contains(a) || min[a.index()] < max[a.index()])
+        };
+        self.0.iter().filter(|&&(_, b)| shares(b)).map(|&(leaf, _)| leaf).collect()
+    }
+
+    /// The leaves.
+    pub(super) fn keys(&self) -> Vec<Key> {
+        self.0.iter().map(|&(leaf, _)| leaf).collect()
+    }
+
+    /// Two leaves that differ by more than one level though they share a piece of a face, edge or corner: the larger, the smaller.
+    pub(super) fn imbalance(&self, balance: Balance) -> Option<(Key, Key)> {
+        let share = |a: Span, b: Span| {
+            let (min, max) = meet(a, b);
+            meets((min, max)) && (0..3).filter(|&i| min[i] == max[i]).count() <= balance as usize
+        };
+        self.0.iter().find_map(|&(a, box_a)| {
+            let smaller = self.0.iter().find(|&&(b, box_b)| a.size() > 2 * b.size() && share(box_a, box_b));
+            smaller.map(|&(b, _)| (a, b))
+        })
+    }
+
+    /// Splits leaves that are too large for a neighbour, as long as there are any.
+    pub(super) fn balance(&mut self, balance: Balance) {
+        while let Some((larger, _)) = self.imbalance(balance) {
+            self.0.retain(|&(leaf, _)| leaf != larger);
+            self.0.extend(larger.children().map(|child| (child, span(child))));
+        }
+        self.0.sort_by_key(|&(leaf, _)| leaf);
+    }
+
+    /// Puts a cell in the place of its children.
+    pub(super) fn merge(&mut self, parent: Key) {
+        self.0.retain(|&(leaf, _)| !parent.contains(leaf));
+        self.0.push((parent, span(parent)));
     }
 
     /// The other leaves that touch this one.
