@@ -2,31 +2,14 @@
 //!
 //! `cargo bench --bench inside`. Compare `winding` and `auto` with `parity` of the same model and depth.
 
+mod common;
+
+use common::Sum;
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use zmend::mesh::{MeshSink, MeshSizes, sample};
+use zmend::mesh::sample;
 use zmend::progress::Silent;
-use zmend::{Inside, Mesh, Options, Result, repair_into};
-
-/// Takes a mesh and keeps only a sum.
-#[derive(Default)]
-struct Sum(f64, u64);
-
-impl MeshSink for Sum {
-    fn begin(&mut self, _: MeshSizes) -> Result<()> {
-        Ok(())
-    }
-
-    fn points(&mut self, points: &[glam::DVec3]) -> Result<()> {
-        self.0 += points.iter().map(|p| p.x).sum::<f64>();
-        Ok(())
-    }
-
-    fn faces(&mut self, _: usize, corners: &[u32]) -> Result<()> {
-        self.1 += corners.iter().map(|&c| u64::from(c)).sum::<u64>();
-        Ok(())
-    }
-}
+use zmend::{Inside, Mesh, Options, repair_into};
 
 /// The mesh without a third of its faces, here and there.
 fn sieve(mesh: &Mesh) -> Mesh {

@@ -2,37 +2,20 @@
 //!
 //! `cargo bench --bench stages`. Throughput is in surface cells (crossed edges), so 1/throughput is ns a surface cell.
 
+mod common;
+
+use common::Sum;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use zmend::contour::{DualOptions, Placement, dual_contouring, marching_cubes};
 use zmend::geom::Frame;
-use zmend::mesh::{MeshSink, MeshSizes, TriangleSource, sample};
+use zmend::mesh::{TriangleSource, sample};
 use zmend::octree::SignedOctree;
 use zmend::progress::Silent;
 use zmend::sign::{close, parity_signs, scan};
-use zmend::{Mesh, Options, Result, repair_into};
+use zmend::{Mesh, Options, repair_into};
 
 const DEPTH: u32 = 8;
-
-/// Takes a mesh and keeps only a sum, so that the extractor is measured and not the memory of the result.
-#[derive(Default)]
-struct Sum(f64, u64);
-
-impl MeshSink for Sum {
-    fn begin(&mut self, _: MeshSizes) -> Result<()> {
-        Ok(())
-    }
-
-    fn points(&mut self, points: &[glam::DVec3]) -> Result<()> {
-        self.0 += points.iter().map(|p| p.x).sum::<f64>();
-        Ok(())
-    }
-
-    fn faces(&mut self, _: usize, corners: &[u32]) -> Result<()> {
-        self.1 += corners.iter().map(|&c| u64::from(c)).sum::<u64>();
-        Ok(())
-    }
-}
 
 fn frame(mesh: &mut Mesh) -> Frame {
     let bounds = mesh.bounds().expect("in memory");

@@ -1,7 +1,7 @@
 //! The cube of the octree in model space, and the fixed-point coordinates in which everything exact is computed.
 
+use super::bounds::Bounds;
 use crate::error::{Error, Result, Short};
-use crate::mesh::Bounds;
 use glam::DVec3;
 
 /// The root cube is 2^26 fixed-point units wide. Edge functions and plane normals of snapped triangles then stay below

@@ -153,6 +153,11 @@ fn cycles(mask: Mask) -> Vec<Vec<Edge>> {
     for [from, to] in Face::ALL.into_iter().flat_map(|face| segments(mask, face)) {
         next[from.index()] = Some(to);
     }
+    cycles_of(next)
+}
+
+/// The cycles in which edges follow each other.
+pub(crate) fn cycles_of(mut next: [Option<Edge>; 12]) -> Vec<Vec<Edge>> {
     let mut cycles = Vec::new();
     for start in Edge::ALL {
         let mut cycle = Vec::new();

@@ -21,6 +21,7 @@ mod topology;
 mod tree;
 mod validate;
 
+pub use crate::geom::Bounds;
 pub use distance::{Deviation, DistanceOptions, Distances};
 pub use edit::{Edit, FaceId, PointId, SavePoint};
 pub use features::{Chain, Constraint, Constraints, FeatureOptions, Features, Group, Groups, chains, grow};
@@ -29,7 +30,7 @@ pub use heal::{Defects, HealOptions, HealStep, Healed};
 pub use polygon::triangulate;
 pub use report::Report;
 pub(crate) use source::Batch;
-pub use stream::{Bounds, MeshSink, MeshSizes, SourceCounts, TriangleSource};
+pub use stream::{MeshSink, MeshSizes, SourceCounts, TriangleSource};
 pub use topology::{
     BoundaryLoop, Diagnosis, EdgeKey, FaceState, Geodesics, MeshKind, Neighbour, Orientation, Search, Topology,
 };

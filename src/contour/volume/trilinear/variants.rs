@@ -8,7 +8,7 @@
 //! have the same one. Where it cannot, they are a fan round a point in the middle; and tunnels have three points round their neck. (Tables of
 //! the 33 cases use such diagonals; where two cells do so at the same face, four triangles meet in one edge.)
 
-use crate::grid::cases::{Mask, best_disc, best_tunnel, inside_end, middle};
+use crate::grid::cases::{Mask, best_disc, best_tunnel, cycles_of, inside_end, middle};
 use crate::grid::{Corner, Edge, Face};
 use std::sync::LazyLock;
 
@@ -83,18 +83,7 @@ fn variant(mask: Mask, joined: impl Fn(Face) -> bool) -> Variant {
             next[edge_after(enter).index()] = Some(edge_after(leave));
         }
     }
-    let mut cycles = Vec::new();
-    for start in Edge::ALL {
-        let mut cycle = Vec::new();
-        let mut edge = start;
-        while let Some(to) = next[edge.index()].take() {
-            cycle.push(edge);
-            edge = to;
-        }
-        if !cycle.is_empty() {
-            cycles.push(cycle);
-        }
-    }
+    let cycles = cycles_of(next);
     let regions = regions(mask, joined);
     let discs = patch(cycles.iter().map(|cycle| &cycle[..]), None);
     let mut variant = Variant { regions, cycles, discs, tunnels: Vec::new() };
