@@ -253,6 +253,48 @@ fn the_program_extracts_volumes() {
     assert!((volumes[0] - volumes[1]).abs() < 1e-3 * volumes[1], "{volumes:?}");
 }
 
+/// Two boxes of one material beside each other in another one fill a block of that size, and their surfaces meet without a gap.
+#[test]
+fn the_program_extracts_labels_that_fit_together() {
+    let shell = Shell::new();
+    let material = |at: [usize; 3]| match at {
+        [0..4, ..] => 1,
+        [4..9, ..] => 6,
+        _ => 0,
+    };
+    let [nx, ny, nz] = [12, 5, 7];
+    let voxels = (0..nx * ny * nz).map(|i| material([i % nx, i / nx % ny, i / (nx * ny)])).collect();
+    let image = Image::new([nx, ny, nz], Placement::default(), Voxels::U8(voxels)).unwrap();
+    write_volume(shell.path("labels.mha"), &image, &Silent).unwrap();
+    let [one, six] = [1, 6].map(|label| {
+        let told = shell.json(&format!("extract labels.mha {label}.ply --label {label}"));
+        assert_eq!((&told["output"]["solid"], &told["options"]["label"]), (&true.into(), &f64::from(label).into()));
+        zmend::io::read(shell.path(&format!("{label}.ply"))).unwrap()
+    });
+    let boundary = |mesh: &Mesh| -> Vec<[[u64; 3]; 3]> {
+        let at = |p: u32| mesh.points[p as usize].to_array().map(|c| (c + 100.0).to_bits());
+        let mut faces: Vec<[[u64; 3]; 3]> = mesh
+            .faces
+            .iter()
+            .map(|face| {
+                let mut corners = [at(face[0]), at(face[1]), at(face[2])];
+                corners.sort_unstable();
+                corners
+            })
+            .collect();
+        faces.sort_unstable();
+        faces
+    };
+    let (of_one, of_six) = (boundary(&one), boundary(&six));
+    let common = of_one.iter().filter(|face| of_six.binary_search(face).is_ok()).count();
+    // The wall between them is a square a point of it, but for the rim.
+    assert!(common >= 2 * (ny - 1) * (nz - 1), "{common} of {}", of_one.len());
+    let error = shell.run("extract labels.mha a.ply --label 3").expect_err("nothing has this label");
+    assert!(error.contains("label: no sample is 3; values go from 0 to 6"), "{error}");
+    let error = shell.run("extract labels.mha a.ply --label 6 --genus 0").expect_err("not together");
+    assert!(error.contains("label: labels become meshes") && !shell.path("a.ply").exists(), "{error}");
+}
+
 #[test]
 fn the_program_says_what_is_wrong_with_volumes() {
     let shell = Shell::new();

@@ -12,10 +12,11 @@ use crate::{digits, interrupt, json, memory, units};
 use serde_json::json;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-use zmend::contour::volume::{Border, ExtractOptions, extract};
+use zmend::contour::volume::{Border, ExtractOptions, extract, extract_label};
 use zmend::io::{self, Format, WriteOptions};
 use zmend::mesh::Bounds;
 use zmend::progress::{Progress, Stage};
+use zmend::volume::Level;
 use zmend::{Error, Options, Place, Result};
 
 pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
@@ -25,6 +26,10 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
     let topology = args.handles.options();
     match to {
         GoalFormat::Mesh(format) if topology.is_nothing() => direct(args, format)?,
+        _ if args.label.is_some() => {
+            let problem = "labels become meshes, without topology repair";
+            return Err(Error::setting("label", problem, "take --iso for octrees and topology repair"));
+        }
         _ => {
             let of_octree = |problem: &str, remedy: &str| Err(Error::setting("method", problem, remedy));
             let Some(surface) = args.method.surface() else {
@@ -55,7 +60,10 @@ fn direct(args: &ExtractArgs, format: Format) -> Result<()> {
     let ExtractArgs { input, out, write, tell, .. } = args;
     let bars = Bars::new(!tell.quiet && !tell.json).within(memory::limit(args.max_memory)?);
     let start = Instant::now();
-    let (mut volume, level) = Loaded::open(input, &args.volume, &bars)?;
+    let (mut volume, level) = match args.label {
+        Some(label) => (Loaded::labelled(input, &args.volume, label, &bars)?, Level::above(0.0)),
+        None => Loaded::open(input, &args.volume, &bars)?,
+    };
     if let Some(cell) = args.cell {
         volume = volume.on_cubes(cell, &bars)?;
     }
@@ -70,7 +78,13 @@ fn direct(args: &ExtractArgs, format: Format) -> Result<()> {
     let write_options = WriteOptions { precision, is_text: write.ascii, ..WriteOptions::default() };
     let (sizes, extracted, bytes) = interrupt::noted(|| {
         let mut writer = io::create(out, format, write_options)?;
-        let sizes = extract(&image, &options, &mut writer, &bars)?;
+        let sizes = match args.label {
+            Some(label) => extract_label(&image, label, &options, &mut writer, &bars)?,
+            None => extract(&image, &options, &mut writer, &bars)?,
+        };
+        if args.label.is_some() && sizes.points == 0 {
+            return Err(told.without_label());
+        }
         let extracted = start.elapsed();
         bars.begin(Stage::Write, 0);
         Ok((sizes, extracted, writer.finish()?))
@@ -130,7 +144,8 @@ impl Outcome<'_> {
                 "options": {
                     "iso": volume.iso,
                     "below": volume.below,
-                    "method": args.method.name(),
+                    "label": args.label,
+                    "method": if args.label.is_some() { "nets" } else { args.method.name() },
                     "open": args.open,
                     "threads": rayon::current_num_threads(),
                 },

@@ -32,6 +32,8 @@ pub(crate) struct Told {
     range: Range,
     /// The level, where one was given.
     level: Option<Level>,
+    /// The material, where one was asked for.
+    label: Option<f64>,
     /// How large the cells are that it was sampled with anew.
     cell: Option<f64>,
 }
@@ -67,6 +69,7 @@ impl Loaded {
             axes: [DVec3::ZERO; 3],
             range: image.voxels().range(),
             level: None,
+            label: None,
             cell: None,
         };
         Ok(Loaded { image, told }.placed())
@@ -74,13 +77,23 @@ impl Loaded {
 
     /// Reads a file as the command line says, and checks that there is a surface.
     pub(crate) fn open(path: &Path, args: &VolumeArgs, progress: &dyn Progress) -> Result<(Self, Level)> {
-        let mut loaded = Loaded::read(path, &args.options(), progress)?;
-        if let Some(spacing) = args.spacing {
-            loaded = Loaded { image: loaded.image.with_spacing(spacing)?, ..loaded }.placed();
-        }
+        let mut loaded = Loaded::spaced(path, args, progress)?;
         let level = loaded.level(args)?;
         loaded.told.level = Some(level);
         Ok((loaded, level))
+    }
+
+    /// Reads a file as the command line says, of which one material is wanted.
+    pub(crate) fn labelled(path: &Path, args: &VolumeArgs, label: f64, progress: &dyn Progress) -> Result<Self> {
+        let mut loaded = Loaded::spaced(path, args, progress)?;
+        loaded.told.label = Some(label);
+        Ok(loaded)
+    }
+
+    fn spaced(path: &Path, args: &VolumeArgs, progress: &dyn Progress) -> Result<Self> {
+        let loaded = Loaded::read(path, &args.options(), progress)?;
+        let Some(spacing) = args.spacing else { return Ok(loaded) };
+        Ok(Loaded { image: loaded.image.with_spacing(spacing)?, ..loaded }.placed())
     }
 
     fn placed(mut self) -> Self {
@@ -159,8 +172,18 @@ impl Told {
         warnings
     }
 
-    /// `above 41` or `below 41`, where there is a level.
+    /// That no sample has the label.
+    pub(crate) fn without_label(&self) -> Error {
+        let label = real(self.label.unwrap_or(f64::NAN));
+        let values = format!("values go from {} to {}", real(self.range.least), real(self.range.greatest));
+        Error::setting("label", format!("no sample is {label}"), format!("{values}: take one that occurs"))
+    }
+
+    /// `above 41`, `below 41` or `equal to 6`, where there is a level or a label.
     pub(crate) fn level_words(&self) -> String {
+        if let Some(label) = self.label {
+            return format!("equal to {}", real(label));
+        }
         self.level.map_or(String::new(), |Level { iso, below }| {
             format!("{} {}", if below { "below" } else { "above" }, real(iso))
         })

@@ -295,10 +295,10 @@ mod tests {
             let moved = [moved[0] + (1 << 14), moved[1] + (1 << 7), moved[2] + 1];
             let (plain, beside) = (solid_angle(&triangle, at), solid_angle(&fine, moved));
             prop_assert_eq!(side(&triangle, at), side(&fine, moved));
-            // Edges and corners apart, these are near to each other.
+            // Away from edges and corners these are near to each other: the step is a 64th.
             let [p, q, r] = triangle.map(position);
             let off = [[p, q], [q, r], [r, p]].map(|s| distance_to(s, position(at)));
-            if off.iter().all(|d| d.is_nan() || *d > 1e-3) {
+            if off.iter().all(|d| d.is_nan() || *d > 0.3) {
                 prop_assert!((plain - beside).abs() < 0.15, "{} {}", plain, beside);
             }
         }

@@ -22,10 +22,13 @@ Examples:
   zmend extract head.mhd head.ply --iso 41 --genus 0     handles cut or tunnels filled, by the least change
   zmend extract head.mhd head.ply --iso 41 --drop-islands 500 --fill-cavities all
   zmend extract head.mhd head.sog --iso 41               the signed octree
+  zmend extract tissues.vti liver.ply --label 6          one material of a volume of materials
 
 Files are MetaImage, NRRD, NIfTI, VTK image data (.vti, .vtk) and SLC; what they contain says which, not their names. The surface lies where \
 the file says the samples are: spacing, origin and directions are honoured. Samples equal to the value are outside, and so is all beyond the volume: \
 the surface is closed there, half a step beyond the last samples.
+
+The surfaces of the labels of a volume fit together without gaps: where two of them touch, both have the same triangles.
 
 Topology repair works on cubes along the axes. A volume of other cells is sampled anew for it, with cubes as wide as its closest samples, or as --cell \
 says.")]
@@ -41,6 +44,9 @@ pub(crate) struct ExtractArgs {
     /// How the surface is made.
     #[arg(short, long, value_name = "METHOD", value_enum, default_value_t = MethodArg::Mc, help_heading = "Surface")]
     pub(crate) method: MethodArg,
+    /// Extract the samples of this value, the number of a material, by surface nets.
+    #[arg(long, value_name = "VALUE", value_parser = coordinate, conflicts_with_all = ["iso", "below", "cell", "method"], help_heading = "Volume")]
+    pub(crate) label: Option<f64>,
     /// Leave the surface open where it leaves the volume, with a rim at the last samples.
     #[arg(long, help_heading = "Surface")]
     pub(crate) open: bool,
