@@ -58,7 +58,7 @@
 //! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring; of volumes in [`contour::volume`] |
 //! | [`volume`] | scalar fields on a lattice: arrays, functions, parts |
-//! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything; crossings and signs in bricks |
+//! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything: refined, balanced, searched; crossings and signs in bricks |
 //! | [`grid`] | keys, axes, corners, bricks of bits, the 256 cases: integers only |
 //! | [`geom`] | the frame of the grid, exact rasterisation, normals in 16 bits, quadratic error functions |
 //! | `render` | shaded pictures; with the feature `render` |
@@ -88,7 +88,7 @@
 //! `cli` (on by default) builds the program `zmend` and brings its dependencies: libraries say `default-features = false`. `render`
 //! (part of `cli`) adds the module `render` and the dependency `png`; `gltf` and `3mf` (parts of `cli`) add these formats, and the
 //! dependencies `serde_json` for the one, `flate2` and `quick-xml` for the other, as does `volumes` (part of `cli`) for VTI files and packed data
-//! in files of volumes.
+//! in files of volumes. `serde` lets octrees be serialised.
 #![forbid(unsafe_code)]
 
 pub mod contour;

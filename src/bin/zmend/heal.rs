@@ -3,7 +3,7 @@
 use crate::args::{HealArgs, Limit};
 use crate::bars::Bars;
 use crate::print::{self, Table};
-use crate::units::count;
+use crate::units::{count, counted};
 use crate::{convert, goal};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -79,9 +79,28 @@ fn table(healed: &Healed) -> String {
     let mut text = table.to_string();
     for step in &healed.steps {
         let undone = if step.is_undone { " (undone: something else was worse for it)" } else { "" };
-        let _ = writeln!(text, "  {} {}{undone}", step.name, count(step.count));
+        let _ = writeln!(text, "  {}{undone}", done(step.name, step.count));
     }
     text
+}
+
+/// What a step did, as a person says it.
+fn done(step: &str, times: u64) -> String {
+    let (one, many) = match step {
+        "replaced" => ("point without a place was given one", "points without a place were given one"),
+        "removed" => ("face or point of no use was removed", "faces and points of no use were removed"),
+        "unduplicated" => ("duplicate face was removed", "duplicate faces were removed"),
+        "welded" => ("point was welded to another", "points were welded to others"),
+        "collapsed" => ("face that collapsed was removed", "faces that collapsed were removed"),
+        "stitched" => ("point was stitched into an edge", "points were stitched into edges"),
+        "flattened" => ("face without area was removed", "faces without area were removed"),
+        "turned" => ("face was turned over", "faces were turned over"),
+        "cut apart" => ("point was doubled to cut solids apart", "points were doubled to cut solids apart"),
+        "filled" => ("hole was filled", "holes were filled"),
+        "untied" => ("point was doubled where fans touch", "points were doubled where fans touch"),
+        other => return format!("{other}: {}", count(times)),
+    };
+    counted(times, one, many)
 }
 
 fn verdict(healed: &Healed) -> String {
