@@ -63,13 +63,18 @@ impl<T> Block<T> {
         }
     }
 
-    /// Makes room for `more` records, in steps of [`ROOM`]; returns for how many more than before.
+    /// For how many records there is room; 0 for records without size, which need none.
+    pub(super) fn room(&self) -> usize {
+        if size_of::<T>() == 0 { 0 } else { self.records.capacity() }
+    }
+
+    /// Makes room for `more` records, in steps of [`ROOM`]; returns for how many more there is [room](Self::room) than before.
     pub(super) fn make_room(&mut self, more: usize) -> usize {
-        let before = self.records.capacity();
-        if before - self.records.len() < more {
+        let before = self.room();
+        if self.records.capacity() - self.records.len() < more {
             self.records.reserve_exact(more.next_multiple_of(ROOM));
         }
-        self.records.capacity() - before
+        self.room() - before
     }
 
     /// Adds a record where there is no leaf.
@@ -171,7 +176,7 @@ impl<T> LinearOctree<T> {
         block.leaves = block.leaves & !Cells::family(place);
         self.levels.remove(first, 8);
         if block.nodes().is_empty() {
-            self.room -= entry.remove().records.capacity();
+            self.room -= entry.remove().room();
         }
         self.unrefine_above(first);
         records.try_into().ok()
@@ -192,7 +197,7 @@ impl<T> LinearOctree<T> {
         block.leaves = block.leaves & !Cells::one(place);
         let was_last = (block.nodes() & Cells::family(place)).is_empty();
         if block.nodes().is_empty() {
-            self.room -= entry.remove().records.capacity();
+            self.room -= entry.remove().room();
         }
         self.levels.remove(leaf, 1);
         if was_last {
@@ -222,7 +227,7 @@ impl<T> LinearOctree<T> {
                 (0..64).step_by(8).filter(|&p| gone.byte(p) != 0 && left.byte(p) == 0).map(|p| name.in_block(p)),
             );
             if left.is_empty() {
-                *room -= block.records.capacity();
+                *room -= block.room();
             }
             !left.is_empty()
         });
@@ -252,7 +257,7 @@ impl<T> LinearOctree<T> {
             block.refined = block.refined & !Cells::one(place);
             let left = block.nodes();
             if left.is_empty() {
-                self.room -= entry.remove().records.capacity();
+                self.room -= entry.remove().room();
             }
             if !(left & Cells::family(place)).is_empty() {
                 return;

@@ -125,7 +125,7 @@ impl<T> LinearOctree<T> {
     /// Puts a block where none is.
     fn put_block(&mut self, name: Key, block: Block<T>) {
         self.levels.add(name, block.leaves.count());
-        self.room += block.records.capacity();
+        self.room += block.room();
         self.blocks.insert(name, block);
     }
 
@@ -137,7 +137,7 @@ impl<T> LinearOctree<T> {
             match self.blocks.entry(name) {
                 Entry::Vacant(slot) => {
                     self.levels.add(name, block.leaves.count());
-                    self.room += block.records.capacity();
+                    self.room += block.room();
                     slot.insert(block);
                 }
                 Entry::Occupied(mut slot) => {
@@ -206,6 +206,17 @@ mod tests {
     use super::*;
     use crate::octree::oracle::{points, tree};
     use proptest::prelude::*;
+
+    /// A `Vec` of such records says that it has room for all there are, which once overflowed the sum over blocks.
+    #[test]
+    fn records_without_size_take_no_room() {
+        let mut tree = LinearOctree::build(4, |_| true, |_| ());
+        assert_eq!((tree.len(), tree.validate()), (4096, Ok(())));
+        tree.append(LinearOctree::build(2, |_| true, |_| ()));
+        tree.retain(|leaf, ()| leaf.level() == Some(4));
+        tree.keys_z().into_iter().for_each(|leaf| tree.remove(leaf).unwrap_or_else(|| panic!("{leaf:?} is a leaf")));
+        assert_eq!((tree.len(), tree.validate()), (0, Ok(())));
+    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]

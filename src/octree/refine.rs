@@ -82,8 +82,9 @@ impl<T> LinearOctree<T> {
     ///     tree.refine(leaf, Balance::Off, |_, &record| record)?;
     ///     leaf = leaf.child(corner);
     /// }
-    /// // A leaf of level 3 at the middle of the root, beside leaves of level 1, which are split before it.
-    /// assert_eq!(tree.refine(leaf, Balance::Faces, |_, &record| record)?, 4);
+    /// // A leaf of level 3 at the middle of the root. Before it, the three leaves of level 1 beside it are split twice, and three that
+    /// // are beside two of those once.
+    /// assert_eq!(tree.refine(leaf, Balance::Faces, |_, &record| record)?, 10);
     /// # Ok::<(), zmend::octree::RefineError>(())
     /// ```
     ///
