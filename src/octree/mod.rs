@@ -146,7 +146,7 @@ impl<T> LinearOctree<T> {
     pub fn shrink_to_fit(&mut self) {
         self.blocks.shrink_to_fit();
         self.blocks.values_mut().for_each(|block| block.records.shrink_to_fit());
-        self.room = self.blocks.values().map(|block| block.room()).sum();
+        self.room = self.blocks.values().map(Block::room).sum();
     }
 
     /// Bytes held by the table and the records, not counting what records own elsewhere. O(1).
