@@ -231,14 +231,15 @@ pub(super) fn solid_angle(triangle: &FineTriangle, at: Corner) -> f64 {
     let p = position(at);
     let relative = triangle.map(|corner| position(corner) - p);
     let (volume, below, scale) = half_angle(relative);
-    // In front of a plane and beside the triangle it is small, whatever its sign.
-    if volume.abs() < 0.05 * below {
-        // The series of the arc tangent, to 1e-12.
-        let t = volume / below;
-        let t2 = t * t;
-        return 2.0 * t * (1.0 - t2 * (1.0 / 3.0 - t2 * (1.0 / 5.0 - t2 * (1.0 / 7.0))));
-    }
+    // Less may be nothing but rounding: on an edge, say.
     if below > 1e-6 * scale {
+        // In front of a plane and beside the triangle it is small, whatever its sign.
+        if volume.abs() < 0.05 * below {
+            // The series of the arc tangent, to 1e-12.
+            let t = volume / below;
+            let t2 = t * t;
+            return 2.0 * t * (1.0 - t2 * (1.0 / 3.0 - t2 * (1.0 / 5.0 - t2 * (1.0 / 7.0))));
+        }
         return 2.0 * volume.atan2(below);
     }
     let rounding = 1e-12 * scale;
@@ -283,6 +284,21 @@ mod tests {
     use super::super::field::distance_to;
     use super::*;
     use proptest::prelude::*;
+
+    proptest! {
+        /// On an edge too, a triangle turned over is seen from the other side. (What was rounding once told the one orientation that it is
+        /// seen from afar.)
+        #[test]
+        fn angles_change_sign_with_the_orientation(corners in prop::array::uniform3(prop::array::uniform3(1..20i32)), part in 0..9i32) {
+            // As large as in a grid; the part of the edge is exact.
+            let [a, b, c] = corners.map(|corner| corner.map(|x| 3_355_443 * x / 8 * 8));
+            let at = std::array::from_fn(|i| a[i] + (b[i] - a[i]) / 8 * part);
+            for [a, b, c] in [[a, b, c], [b, c, a], [c, a, b]] {
+                let (there, back) = (solid_angle(&[a, b, c], at), solid_angle(&[c, b, a], at));
+                prop_assert!((there + back).abs() < 1e-3, "{} {}", there, back);
+            }
+        }
+    }
 
     proptest! {
         /// On a plane of a triangle too, angles jump where the rasteriser's lattice says.
