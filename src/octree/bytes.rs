@@ -28,7 +28,7 @@ const END: u64 = 1 << (3 * MAX_LEVEL);
 
 /// Bytes.
 impl<T> LinearOctree<T> {
-    /// The tree as bytes; `write` appends a record's. O(n). See the [module](self) for the format.
+    /// The tree as bytes; `write` appends a record's. O(n). After a version come, for each leaf in Z-order, its level and the gap before it, if there is one.
     ///
     /// ```
     /// use zmend::octree::LinearOctree;

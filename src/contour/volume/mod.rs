@@ -22,7 +22,7 @@
 //!
 //! # What holds
 //!
-//! - Samples equal to the level are outside, and so are those that are not a number ([`Level`](crate::volume::Level)). Every point
+//! - Samples equal to the level are outside, and so are those that are not a number ([`Level`]). Every point
 //!   keeps a thousandth of an edge from the samples. So there are no faces without area, and no two points at one place.
 //! - The surface is closed where it leaves the volume: half a step beyond the last samples, so that each sample is the middle of a box and
 //!   the volume as large as all boxes. On request ([`Border::Open`]) it ends at the last samples.

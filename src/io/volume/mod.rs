@@ -12,7 +12,7 @@
 //!
 //! With the feature `volumes`, packed data are read in all of them, and files that are packed as a whole (`.nii.gz`).
 //!
-//! The content says the format. Headers are parsed from the first megabyte into a [layout](self::layout) of the data, and the data streamed from
+//! The content says the format. Headers are parsed from the first megabyte into a layout of the data, and the data streamed from
 //! the file into the volume, so nothing is held twice (but for VTI and SLC, whose files are held while they are read). No more is
 //! allocated than the file can hold, packed as it may be. Integers of 64 bits become 32 bits where all samples fit, else doubles. Where a sample is
 //! several numbers, somebody must say which one is meant.
