@@ -1,0 +1,139 @@
+//! The recursion over cells, faces, edges and points (Ju, Losasso, Schaefer and Warren 2002; Zhou, Ju and Hu 2007).
+//!
+//! A cell leads to 8 cells, 12 faces, 6 edges and a point, a face to 4 faces, 4 edges and a point, an edge to 2 edges and a point, a point
+//! to one point. Nodes come with an element by the sides on which they lie: of a face the low one first; of an edge by the two other
+//! axes in the order x, y, z; of a point as children are numbered. So the k-th of the nodes round an edge has it as its edge
+//! `4 axis + 3 - k`, the k-th of those at a point has it as its corner `7 - k`. A leaf stands for its children where others are divided.
+
+use super::node::{Link, Node};
+use std::cell::Cell;
+
+/// The bit of an axis in the number of a child.
+pub(crate) const BIT: [usize; 3] = [4, 2, 1];
+/// The two other axes.
+pub(crate) const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
+/// Is shown elements all nodes of which are leaves, or nothing; and says where to go on.
+pub(crate) trait Visitor<'a, R> {
+    /// Which of faces, edges and points it wants to see; of cells it sees none.
+    const FACES: bool = false;
+    const EDGES: bool = false;
+    const POINTS: bool = false;
+
+    /// Whether to look into elements between these nodes, one of which is divided.
+    fn enters(&self, nodes: &[Link<'a, R>]) -> bool;
+
+    fn face(&mut self, _axis: usize, _nodes: [Link<'a, R>; 2]) {}
+
+    fn edge(&mut self, _axis: usize, _nodes: [Link<'a, R>; 4]) {}
+
+    fn point(&mut self, _nodes: [Link<'a, R>; 8]) {}
+}
+
+/// Passes over everything inside of a node.
+pub(crate) fn traverse<'a, R, V: Visitor<'a, R>>(node: &'a Node<'a, R>, visitor: &mut V) {
+    let Node::Inner(inner) = node else { return };
+    let kids = inner.kids.each_ref().map(Cell::get);
+    kids.into_iter().flatten().for_each(|kid| traverse(kid, visitor));
+    if V::FACES {
+        faces::<R, V, 0, 1, 2>(&kids, visitor);
+        faces::<R, V, 1, 0, 2>(&kids, visitor);
+        faces::<R, V, 2, 0, 1>(&kids, visitor);
+    }
+    if V::EDGES {
+        edges::<R, V, 0, 1, 2>(&kids, visitor);
+        edges::<R, V, 1, 0, 2>(&kids, visitor);
+        edges::<R, V, 2, 0, 1>(&kids, visitor);
+    }
+    if V::POINTS {
+        point(kids, visitor);
+    }
+}
+
+/// The four faces across an axis round the middle of eight nodes.
+#[inline]
+fn faces<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(
+    nodes: &[Link<'a, R>; 8],
+    visitor: &mut V,
+) {
+    for i in [0, BIT[W], BIT[U], BIT[U] | BIT[W]] {
+        face::<R, V, A, U, W>([nodes[i], nodes[i | BIT[A]]], visitor);
+    }
+}
+
+/// The two edges along an axis at the middle of eight nodes.
+#[inline]
+fn edges<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(
+    nodes: &[Link<'a, R>; 8],
+    visitor: &mut V,
+) {
+    let (u, v) = (BIT[U].max(BIT[W]), BIT[U].min(BIT[W]));
+    for half in [0, BIT[A]] {
+        edge::<R, V, A, U, W>([half, half | v, half | u, half | u | v].map(|i| nodes[i]), visitor);
+    }
+}
+
+#[inline]
+fn child<'a, R>(node: Link<'a, R>, i: usize) -> Link<'a, R> {
+    node.and_then(|node| node.child(i))
+}
+
+/// Whether all of the nodes are leaves or nothing; `None` if not, but one must not look inside.
+#[inline]
+fn are_leaves<'a, R, V: Visitor<'a, R>>(nodes: &[Link<'a, R>], visitor: &V) -> Option<bool> {
+    let divided = nodes.iter().flatten().any(|node| node.is_inner());
+    if !divided { Some(true) } else { visitor.enters(nodes).then_some(false) }
+}
+
+fn face<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(
+    nodes: [Link<'a, R>; 2],
+    visitor: &mut V,
+) {
+    match are_leaves(&nodes, visitor) {
+        None => return,
+        Some(true) => return visitor.face(A, nodes),
+        Some(false) => {}
+    }
+    // Round the middle of the face are the high children of the low node, and the other way round.
+    let [low, high] = nodes;
+    let bit = BIT[A];
+    let round = std::array::from_fn(|i| if i & bit == 0 { child(low, i | bit) } else { child(high, i ^ bit) });
+    faces::<R, V, A, U, W>(&round, visitor);
+    if V::EDGES {
+        edges::<R, V, U, A, W>(&round, visitor);
+        edges::<R, V, W, A, U>(&round, visitor);
+    }
+    if V::POINTS {
+        point(round, visitor);
+    }
+}
+
+fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(
+    nodes: [Link<'a, R>; 4],
+    visitor: &mut V,
+) {
+    match are_leaves(&nodes, visitor) {
+        None => return,
+        Some(true) => return visitor.edge(A, nodes),
+        Some(false) => {}
+    }
+    // Of the node on one side of the edge, the children on the other side touch it.
+    let (u, v) = (BIT[U].max(BIT[W]), BIT[U].min(BIT[W]));
+    let round = std::array::from_fn(|i| {
+        child(nodes[2 * usize::from(i & u != 0) + usize::from(i & v != 0)], i ^ (u | v))
+    });
+    edges::<R, V, A, U, W>(&round, visitor);
+    if V::POINTS {
+        point(round, visitor);
+    }
+}
+
+fn point<'a, R, V: Visitor<'a, R>>(mut nodes: [Link<'a, R>; 8], visitor: &mut V) {
+    loop {
+        match are_leaves(&nodes, visitor) {
+            None => return,
+            Some(true) => return visitor.point(nodes),
+            Some(false) => nodes = std::array::from_fn(|i| child(nodes[i], 7 - i)),
+        }
+    }
+}
