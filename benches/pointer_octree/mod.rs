@@ -5,11 +5,14 @@
 //! faces, edges and points ([`traverse`]).
 #![allow(dead_code, reason = "each program uses its own part")]
 
-mod blocks;
+pub(crate) mod blocks;
 pub(crate) mod contour;
+pub(crate) mod elements;
 pub(crate) mod node;
 pub(crate) mod scan;
 pub(crate) mod sign;
+pub(crate) mod span;
+pub(crate) mod thin;
 pub(crate) mod traverse;
 
 use node::{Memory, Tree};

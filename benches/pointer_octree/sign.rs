@@ -2,6 +2,7 @@
 
 use super::node::{Link, Node, Tree};
 use super::traverse::{Visitor, traverse};
+use std::cell::Cell;
 use std::sync::LazyLock;
 use zmend::grid::Edge;
 use zmend::grid::cases::{self, CASES};
@@ -63,23 +64,50 @@ impl<'a, R: 'a> Visitor<'a, R> for Spread {
 ///
 /// Cost: a pass over the edges, and one over the cells.
 pub(crate) fn sign<R>(tree: &Tree<'_, R>) -> Counts {
+    sign_and(tree, &mut |_, _| ())
+}
+
+/// The same, and makes leaves of what is nothing yet: then the leaves fill the root, each with the signs of its corners.
+pub(crate) fn sign_all<R: Default>(tree: &Tree<'_, R>) -> Counts {
+    sign_and(tree, &mut |link, sign| {
+        let node = tree.memory.leaf();
+        if let Node::Leaf(leaf) = node {
+            leaf.a.set(u64::from(sign) << CORNERS);
+        }
+        link.set(Some(node));
+    })
+}
+
+/// `missing` is told where there is no child, and the sign there (all ones: inside).
+fn sign_and<'a, R>(tree: &Tree<'a, R>, missing: &mut impl FnMut(&Cell<Link<'a, R>>, u8)) -> Counts {
     traverse(tree.root, &mut Spread);
     let mut counts = Counts::default();
-    descend(tree.root, 0, &CORNERS_OF, &mut counts);
+    descend(tree.root, 0, &CORNERS_OF, &mut counts, missing);
     counts
 }
 
 /// Signs of a cell whose least corner has the sign `first` (all ones: inside); returns those of its corners.
-fn descend<R>(node: &Node<'_, R>, first: u8, table: &[u8], counts: &mut Counts) -> u8 {
+fn descend<'a, R>(
+    node: &Node<'a, R>,
+    first: u8,
+    table: &[u8],
+    counts: &mut Counts,
+    missing: &mut impl FnMut(&Cell<Link<'a, R>>, u8),
+) -> u8 {
     match node {
         Node::Inner(inner) => {
-            let [kid, ..] = inner.kids;
+            let mut of = |i: usize, sign: u8| match inner.kids[i].get() {
+                Some(kid) => descend(kid, sign, table, counts, missing),
+                None => {
+                    missing(&inner.kids[i], sign);
+                    sign
+                }
+            };
             // Of the least child all corners are known then: they are the others' least corners.
-            let least = kid.get().map_or(first, |kid| descend(kid, first, table, counts));
+            let least = of(0, first);
             (1..8).fold(least & 1, |corners, i| {
                 let sign = if least >> i & 1 == 1 { 0xff } else { 0 };
-                let own = inner.kids[i].get().map_or(sign, |kid| descend(kid, sign, table, counts));
-                corners | own & 1 << i
+                corners | of(i, sign) & 1 << i
             })
         }
         Node::Leaf(leaf) => {

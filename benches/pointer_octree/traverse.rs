@@ -5,7 +5,7 @@
 //! axes in the order x, y, z; of a point as children are numbered. So the k-th of the nodes round an edge has it as its edge
 //! `4 axis + 3 - k`, the k-th of those at a point has it as its corner `7 - k`. A leaf stands for its children where others are divided.
 
-use super::node::{Link, Node};
+use super::node::{Leaf, Link, Node};
 use std::cell::Cell;
 
 /// The bit of an axis in the number of a child.
@@ -15,13 +15,23 @@ pub(crate) const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
 /// Is shown elements all nodes of which are leaves, or nothing; and says where to go on.
 pub(crate) trait Visitor<'a, R> {
-    /// Which of faces, edges and points it wants to see; of cells it sees none.
+    /// Which of faces, edges and points it wants to see; of cells it sees all leaves.
     const FACES: bool = false;
     const EDGES: bool = false;
     const POINTS: bool = false;
 
     /// Whether to look into elements between these nodes, one of which is divided.
     fn enters(&self, nodes: &[Link<'a, R>]) -> bool;
+
+    /// What is worth remembering while one is between nodes; it is told again in [`leaves`](Self::leaves).
+    fn state(&self) -> u64 {
+        0
+    }
+
+    /// All between these nodes has been seen.
+    fn leaves(&mut self, _nodes: &[Link<'a, R>], _state: u64) {}
+
+    fn cell(&mut self, _leaf: &'a Leaf<R>) {}
 
     fn face(&mut self, _axis: usize, _nodes: [Link<'a, R>; 2]) {}
 
@@ -32,7 +42,14 @@ pub(crate) trait Visitor<'a, R> {
 
 /// Passes over everything inside of a node.
 pub(crate) fn traverse<'a, R, V: Visitor<'a, R>>(node: &'a Node<'a, R>, visitor: &mut V) {
-    let Node::Inner(inner) = node else { return };
+    let inner = match node {
+        Node::Inner(inner) => inner,
+        Node::Leaf(leaf) => return visitor.cell(leaf),
+    };
+    if !visitor.enters(&[Some(node)]) {
+        return;
+    }
+    let state = visitor.state();
     let kids = inner.kids.each_ref().map(Cell::get);
     kids.into_iter().flatten().for_each(|kid| traverse(kid, visitor));
     if V::FACES {
@@ -48,6 +65,7 @@ pub(crate) fn traverse<'a, R, V: Visitor<'a, R>>(node: &'a Node<'a, R>, visitor:
     if V::POINTS {
         point(kids, visitor);
     }
+    visitor.leaves(&[Some(node)], state);
 }
 
 /// The four faces across an axis round the middle of eight nodes.
@@ -94,6 +112,7 @@ fn face<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
         Some(true) => return visitor.face(A, nodes),
         Some(false) => {}
     }
+    let state = visitor.state();
     // Round the middle of the face are the high children of the low node, and the other way round.
     let [low, high] = nodes;
     let bit = BIT[A];
@@ -106,6 +125,7 @@ fn face<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
     if V::POINTS {
         point(round, visitor);
     }
+    visitor.leaves(&nodes, state);
 }
 
 fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(
@@ -117,6 +137,7 @@ fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
         Some(true) => return visitor.edge(A, nodes),
         Some(false) => {}
     }
+    let state = visitor.state();
     // Of the node on one side of the edge, the children on the other side touch it.
     let (u, v) = (BIT[U].max(BIT[W]), BIT[U].min(BIT[W]));
     let round = std::array::from_fn(|i| {
@@ -126,14 +147,16 @@ fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
     if V::POINTS {
         point(round, visitor);
     }
+    visitor.leaves(&nodes, state);
 }
 
-fn point<'a, R, V: Visitor<'a, R>>(mut nodes: [Link<'a, R>; 8], visitor: &mut V) {
-    loop {
-        match are_leaves(&nodes, visitor) {
-            None => return,
-            Some(true) => return visitor.point(nodes),
-            Some(false) => nodes = std::array::from_fn(|i| child(nodes[i], 7 - i)),
-        }
+fn point<'a, R, V: Visitor<'a, R>>(nodes: [Link<'a, R>; 8], visitor: &mut V) {
+    match are_leaves(&nodes, visitor) {
+        None => return,
+        Some(true) => return visitor.point(nodes),
+        Some(false) => {}
     }
+    let state = visitor.state();
+    point(std::array::from_fn(|i| child(nodes[i], 7 - i)), visitor);
+    visitor.leaves(&nodes, state);
 }
