@@ -193,7 +193,7 @@ pub(crate) fn faces_round<'a>(axis: usize, [a, b, c, d]: [TopoLink<'a>; 4]) -> [
 #[inline]
 pub(crate) fn nodes_round<'a>(nodes: &[TopoLink<'a>; 8], axis: usize, up: bool) -> [TopoLink<'a>; 4] {
     let ([u, v], half) = (OTHERS[axis].map(|a| BIT[a]), if up { BIT[axis] } else { 0 });
-    [half, half | v, half | u, half | u | v].map(|i| nodes[i])
+    [nodes[half], nodes[half | v], nodes[half | u], nodes[half | u | v]]
 }
 
 /// The area of the quadrilateral through the centres of the leaves round an edge, in square finest cells.

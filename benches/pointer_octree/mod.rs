@@ -6,8 +6,10 @@
 #![allow(dead_code, reason = "each program uses its own part")]
 
 pub(crate) mod blocks;
+pub(crate) mod cell_map;
 pub(crate) mod contour;
 pub(crate) mod elements;
+pub(crate) mod locate;
 pub(crate) mod node;
 pub(crate) mod scan;
 pub(crate) mod sign;

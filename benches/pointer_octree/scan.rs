@@ -27,8 +27,12 @@ struct Falling {
     normal: [i64; 3],
     /// Edge functions by the axis along which one looks and by edge: slopes along the two other axes.
     slopes: [[[i64; 2]; 3]; 3],
+    /// By how much they grow at most over a cube with sides of 1.
+    reach: [[i64; 3]; 3],
     /// Slopes of the plane, and by how much its value may be wrong.
     plane: [f64; 3],
+    /// By how much the plane's value falls and grows at most over a cube with sides of 1.
+    plane_reach: [f64; 2],
     slack: f64,
 }
 
@@ -77,7 +81,10 @@ impl Falling {
         });
         let plane = normal.map(|n| -(n as f64));
         let slack = plane.iter().map(|n| n.abs()).sum::<f64>() / f64::from(1 << 16);
-        Falling { corners, min: along(i64::min), max: along(i64::max), normal, slopes, plane, slack }
+        let reach = slopes.map(|edges: [[i64; 2]; 3]| edges.map(|[a, b]| a.max(0) + b.max(0)));
+        let plane_reach = [plane.iter().map(|n| n.min(0.0)).sum(), plane.iter().map(|n| n.max(0.0)).sum()];
+        let (min, max) = (along(i64::min), along(i64::max));
+        Falling { corners, min, max, normal, slopes, reach, plane, plane_reach, slack }
     }
 
     /// The functions at a point.
@@ -133,7 +140,7 @@ impl Falling {
                 continue;
             }
             let Some(values) = self.overlaps(values, high, half) else { continue };
-            let at = std::array::from_fn(|a| at[a] + ((high[a] as i64) << half));
+            let at = [0, 1, 2].map(|a: usize| at[a] + ((high[a] as i64) << half));
             let kid = made(tree, &inner.kids[i], half == shift);
             match kid {
                 Node::Inner(inner) => self.enter(tree, inner, at, half - 1, &values),
@@ -146,25 +153,32 @@ impl Falling {
     #[inline]
     fn overlaps(&self, values: &Values, high: [usize; 3], half: u32) -> Option<Values> {
         let mut child = *values;
+        let [x, y, z] = [-(high[0] as i64), -(high[1] as i64), -(high[2] as i64)];
         let side = (1i64 << half) as f64;
-        let mut reach = [-self.slack, self.slack];
-        for a in 0..3 {
-            child.plane += self.plane[a] * side * high[a] as f64;
-            reach[usize::from(self.plane[a] > 0.0)] += self.plane[a] * side;
-        }
-        if child.plane + reach[0] > 0.0 || child.plane + reach[1] < 0.0 {
+        let [p, q, r] = self.plane;
+        child.plane += side * (p * high[0] as f64 + q * high[1] as f64 + r * high[2] as f64);
+        if child.plane + side * self.plane_reach[0] - self.slack > 0.0
+            || child.plane + side * self.plane_reach[1] + self.slack < 0.0
+        {
             return None;
         }
-        for axis in 0..3 {
-            let [u, v] = OTHERS[axis].map(|a| -(high[a] as i64));
-            for (value, [a, b]) in child.edges[axis].iter_mut().zip(self.slopes[axis]) {
-                *value += ((a & u) + (b & v)) << half;
-                if *value + ((a.max(0) + b.max(0)) << half) < 0 {
-                    return None;
-                }
-            }
+        let overlaps = self.step(0, &mut child, [y, z], half)
+            && self.step(1, &mut child, [x, z], half)
+            && self.step(2, &mut child, [x, y], half);
+        overlaps.then_some(child)
+    }
+
+    /// Moves the edge functions seen along an axis to a child; whether it touches the triangle's projection.
+    #[inline]
+    fn step(&self, axis: usize, values: &mut Values, [u, v]: [i64; 2], half: u32) -> bool {
+        let (slopes, reach, values) = (&self.slopes[axis], &self.reach[axis], &mut values.edges[axis]);
+        let mut least = 0;
+        for i in 0..3 {
+            let [a, b] = slopes[i];
+            values[i] += ((a & u) + (b & v)) << half;
+            least |= values[i] + (reach[i] << half);
         }
-        Some(child)
+        least >= 0
     }
 
     /// Marks those of the three edges at the least corner of a cell that are crossed.
@@ -172,11 +186,16 @@ impl Falling {
     fn mark<R>(&self, leaf: &Node<'_, R>, at: [i64; 3], shift: u32, values: &Values) {
         let Node::Leaf(leaf) = leaf else { return };
         for axis in 0..3 {
-            let passes = values.edges[axis].iter().zip(self.slopes[axis]).all(|(&value, [a, b])| {
-                let zero_is_inside = a > 0 || (a == 0 && b > 0);
-                value - i64::from(!zero_is_inside) >= 0
-            });
-            if !passes || self.normal[axis] == 0 {
+            let [p, q, r] = values.edges[axis];
+            if (p | q | r) < 0 || self.normal[axis] == 0 {
+                continue;
+            }
+            // A line through an edge of the projection passes on one side of it.
+            let beside = |i: usize| {
+                let [a, b] = self.slopes[axis][i];
+                values.edges[axis][i] == 0 && !(a > 0 || (a == 0 && b > 0))
+            };
+            if beside(0) || beside(1) || beside(2) {
                 continue;
             }
             if let Some(offset) = self.offset(axis, at, shift) {

@@ -24,7 +24,7 @@ pub(crate) struct Counts {
 }
 
 /// The inside corners of a cell whose least corner is outside, by its crossed edges.
-static CORNERS_OF: LazyLock<Vec<u8>> = LazyLock::new(|| {
+pub(crate) static CORNERS_OF: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mut table = vec![0; 1 << 12];
     for mask in (0..=255u8).step_by(2) {
         let edges = Edge::ALL.iter().filter(|&&e| cases::is_crossed(mask, e));
@@ -126,7 +126,7 @@ fn descend<'a, R>(
 }
 
 /// The edges of each face.
-const FACES: [u64; 6] = {
+pub(crate) const FACES: [u64; 6] = {
     let edges = [[4, 8, 5, 9], [6, 10, 7, 11], [0, 8, 1, 10], [2, 9, 3, 11], [0, 4, 2, 6], [1, 5, 3, 7]];
     let mut faces = [0; 6];
     let mut i = 0;

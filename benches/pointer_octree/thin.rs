@@ -159,7 +159,8 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         if !self.is_there(face) {
             return;
         }
-        if let Some(cell) = self.only(nodes.map(|node| node.and_then(Node::leaf).map(TopoLeaf::cell))) {
+        let cell = |node: TopoLink<'a>| node.and_then(Node::leaf).map(TopoLeaf::cell);
+        if let Some(cell) = self.only([cell(nodes[0]), cell(nodes[1])]) {
             self.remove(face);
             self.remove(cell);
             self.faces += 1;
@@ -196,7 +197,8 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         if !self.is_there(point) {
             return;
         }
-        let edges = std::array::from_fn::<_, 6, _>(|i| edge_slot(i / 2, nodes_round(&nodes, i / 2, i % 2 == 1)));
+        let along = |axis: usize, up: bool| edge_slot(axis, nodes_round(&nodes, axis, up));
+        let edges = [along(0, false), along(0, true), along(1, false), along(1, true), along(2, false), along(2, true)];
         if let Some(edge) = self.only(edges) {
             self.remove(point);
             self.remove(edge);

@@ -6,12 +6,16 @@
 //! `4 axis + 3 - k`, the k-th of those at a point has it as its corner `7 - k`. A leaf stands for its children where others are divided.
 
 use super::node::{Leaf, Link, Node};
-use std::cell::Cell;
 
 /// The bit of an axis in the number of a child.
 pub(crate) const BIT: [usize; 3] = [4, 2, 1];
 /// The two other axes.
 pub(crate) const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
+/// An array by index, written out: loops over so few do not become straight code by themselves.
+macro_rules! by_index {
+    ($f:expr; $($i:literal)*) => { [$($f($i)),*] };
+}
 
 /// Is shown elements all nodes of which are leaves, or nothing; and says where to go on.
 pub(crate) trait Visitor<'a, R> {
@@ -50,7 +54,7 @@ pub(crate) fn traverse<'a, R, V: Visitor<'a, R>>(node: &'a Node<'a, R>, visitor:
         return;
     }
     let state = visitor.state();
-    let kids = inner.kids.each_ref().map(Cell::get);
+    let kids = by_index!(|i: usize| inner.kids[i].get(); 0 1 2 3 4 5 6 7);
     kids.into_iter().flatten().for_each(|kid| traverse(kid, visitor));
     if V::FACES {
         faces::<R, V, 0, 1, 2>(&kids, visitor);
@@ -74,9 +78,11 @@ fn faces<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usiz
     nodes: &[Link<'a, R>; 8],
     visitor: &mut V,
 ) {
-    for i in [0, BIT[W], BIT[U], BIT[U] | BIT[W]] {
-        face::<R, V, A, U, W>([nodes[i], nodes[i | BIT[A]]], visitor);
-    }
+    let [a, b, c, d] = [0, BIT[W], BIT[U], BIT[U] | BIT[W]];
+    face::<R, V, A, U, W>([nodes[a], nodes[a | BIT[A]]], visitor);
+    face::<R, V, A, U, W>([nodes[b], nodes[b | BIT[A]]], visitor);
+    face::<R, V, A, U, W>([nodes[c], nodes[c | BIT[A]]], visitor);
+    face::<R, V, A, U, W>([nodes[d], nodes[d | BIT[A]]], visitor);
 }
 
 /// The two edges along an axis at the middle of eight nodes.
@@ -86,9 +92,9 @@ fn edges<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usiz
     visitor: &mut V,
 ) {
     let (u, v) = (BIT[U].max(BIT[W]), BIT[U].min(BIT[W]));
-    for half in [0, BIT[A]] {
-        edge::<R, V, A, U, W>([half, half | v, half | u, half | u | v].map(|i| nodes[i]), visitor);
-    }
+    edge::<R, V, A, U, W>([nodes[0], nodes[v], nodes[u], nodes[u | v]], visitor);
+    let half = BIT[A];
+    edge::<R, V, A, U, W>([nodes[half], nodes[half | v], nodes[half | u], nodes[half | u | v]], visitor);
 }
 
 #[inline]
@@ -116,7 +122,8 @@ fn face<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
     // Round the middle of the face are the high children of the low node, and the other way round.
     let [low, high] = nodes;
     let bit = BIT[A];
-    let round = std::array::from_fn(|i| if i & bit == 0 { child(low, i | bit) } else { child(high, i ^ bit) });
+    let round = |i: usize| if i & bit == 0 { child(low, i | bit) } else { child(high, i ^ bit) };
+    let round = by_index!(round; 0 1 2 3 4 5 6 7);
     faces::<R, V, A, U, W>(&round, visitor);
     if V::EDGES {
         edges::<R, V, U, A, W>(&round, visitor);
@@ -140,9 +147,8 @@ fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
     let state = visitor.state();
     // Of the node on one side of the edge, the children on the other side touch it.
     let (u, v) = (BIT[U].max(BIT[W]), BIT[U].min(BIT[W]));
-    let round = std::array::from_fn(|i| {
-        child(nodes[2 * usize::from(i & u != 0) + usize::from(i & v != 0)], i ^ (u | v))
-    });
+    let round = |i: usize| child(nodes[2 * usize::from(i & u != 0) + usize::from(i & v != 0)], i ^ (u | v));
+    let round = by_index!(round; 0 1 2 3 4 5 6 7);
     edges::<R, V, A, U, W>(&round, visitor);
     if V::POINTS {
         point(round, visitor);
@@ -157,6 +163,6 @@ fn point<'a, R, V: Visitor<'a, R>>(nodes: [Link<'a, R>; 8], visitor: &mut V) {
         Some(false) => {}
     }
     let state = visitor.state();
-    point(std::array::from_fn(|i| child(nodes[i], 7 - i)), visitor);
+    point(by_index!(|i: usize| child(nodes[i], 7 - i); 0 1 2 3 4 5 6 7), visitor);
     visitor.leaves(&nodes, state);
 }
