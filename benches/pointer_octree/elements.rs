@@ -249,3 +249,10 @@ fn below(node: &TopoNode<'_>, at: [u32; 3], size: u32, tags: &[u64]) {
         }
     }
 }
+
+/// Forgets the records of all faces; their memory stays where it is.
+pub(crate) fn forget(tree: &TopoTree<'_>) {
+    for place in super::locate::leaves(tree) {
+        place.leaf.rest.records.set(None);
+    }
+}

@@ -8,6 +8,7 @@
 pub(crate) mod blocks;
 pub(crate) mod cell_map;
 pub(crate) mod contour;
+pub(crate) mod element_map;
 pub(crate) mod elements;
 pub(crate) mod locate;
 pub(crate) mod node;
