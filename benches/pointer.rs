@@ -94,7 +94,8 @@ fn stages(c: &mut Criterion) {
     scan::scan(&tree, &mut &mesh, &frame).expect("in memory");
     let mut signs = group(c, "pointer/signs", cells);
     signs.bench_function("zmend", |b| {
-        let signed = |crossings| zmend::sign::parity_signs(zmend::sign::close(crossings, &Silent).expect("in memory").0);
+        let signed =
+            |crossings| zmend::sign::parity_signs(zmend::sign::close(crossings, &Silent).expect("in memory").0);
         b.iter_batched(|| crossings.clone(), signed, BatchSize::LargeInput);
     });
     signs.bench_function("pointer", |b| b.iter(|| sign::sign(&tree)));

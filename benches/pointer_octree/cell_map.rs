@@ -201,8 +201,7 @@ pub(crate) fn marching_cubes<M: CellMap<Record>>(
 ) -> Result<MeshSizes> {
     const BATCH: usize = 1 << 15;
     let (depth, cases) = (frame.depth(), &*CASES);
-    let sizes =
-        MeshSizes { points: counts.crossings, faces: counts.triangles, corners: 3 * counts.triangles };
+    let sizes = MeshSizes { points: counts.crossings, faces: counts.triangles, corners: 3 * counts.triangles };
     sink.begin(sizes)?;
     let mut points = Vec::with_capacity(BATCH + 3);
     for &key in keys {

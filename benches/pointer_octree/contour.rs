@@ -5,12 +5,12 @@
 
 use super::node::{Leaf, Link, Node, Tree};
 use super::sign::{CORNERS, Counts};
-use super::traverse::{Visitor, traverse};
+use super::traverse::{Visitor, traverse, traverse_far_sides};
 use zmend::Result;
 use zmend::geom::Frame;
 use zmend::glam::DVec3;
-use zmend::grid::cases::{CASES, Case};
 use zmend::grid::Edge;
+use zmend::grid::cases::{CASES, Case};
 use zmend::mesh::{MeshSink, MeshSizes};
 use zmend::octree::crossings::Sample;
 
@@ -33,8 +33,10 @@ pub(crate) fn marching_cubes<R>(
     let mut points = Points { frame, sink: &mut *sink, batch: Vec::with_capacity(BATCH + 8) };
     points.of(tree.root, [0; 3], tree.depth)?;
     points.sink.points(&points.batch)?;
-    let mut triangles = Triangles { cases: &CASES, sink: &mut *sink, batch: Vec::with_capacity(BATCH + 16), result: Ok(()) };
+    let mut triangles =
+        Triangles { cases: &CASES, sink: &mut *sink, batch: Vec::with_capacity(BATCH + 16), result: Ok(()) };
     traverse(tree.root, &mut triangles);
+    traverse_far_sides(tree.root, &mut triangles);
     let Triangles { batch, result, .. } = triangles;
     result?;
     sink.faces(3, &batch)?;

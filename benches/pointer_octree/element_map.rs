@@ -33,9 +33,9 @@ pub(crate) fn fill<R, M: CellMap<Removed>>(tree: &Tree<'_, R>, map: &mut M) {
     for (i, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
         let at = [i / side / side, i / side % side, i % side].map(|c| c as u32);
         for extent in 0..8u32 {
-            let is_there = (0..8u32).filter(|corner| corner & !extent == 0).all(|corner| {
-                inside[index([at[0] + (corner >> 2), at[1] + (corner >> 1 & 1), at[2] + (corner & 1)])]
-            });
+            let is_there = (0..8u32)
+                .filter(|corner| corner & !extent == 0)
+                .all(|corner| inside[index([at[0] + (corner >> 2), at[1] + (corner >> 1 & 1), at[2] + (corner & 1)])]);
             if is_there {
                 *map.made(finest_element(depth, at, Extent::ALL[extent as usize])) = 0;
             }

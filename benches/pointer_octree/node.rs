@@ -62,7 +62,8 @@ impl<'a, R: Default> Memory<'a, R> {
     /// A new leaf, all zero.
     #[inline]
     pub(crate) fn leaf(&'a self) -> &'a Node<'a, R> {
-        let leaf = || Leaf { a: Cell::new(0), b: Cell::new(0), vertex: Cell::new(0), tag: Tag::Leaf, rest: R::default() };
+        let leaf =
+            || Leaf { a: Cell::new(0), b: Cell::new(0), vertex: Cell::new(0), tag: Tag::Leaf, rest: R::default() };
         self.nodes.take().get_or_init(|| Node::Leaf(leaf()))
     }
 

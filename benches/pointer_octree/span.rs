@@ -5,7 +5,7 @@
 //! component; here edges are sorted once, and all components are in the forest. Areas are not divided by four as there.
 
 use super::elements::{
-    Beside, Slot, THERE, GONE, TopoLeaf, TopoLink, TopoNode, TopoTree, dual_area, edge_slot, face_slot, faces_round,
+    Beside, GONE, Slot, THERE, TopoLeaf, TopoLink, TopoNode, TopoTree, dual_area, edge_slot, face_slot, faces_round,
     point_slot,
 };
 use super::node::Node;

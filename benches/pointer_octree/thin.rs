@@ -40,8 +40,7 @@ pub(crate) fn thin<'a>(tree: &TopoTree<'a>, records: &'a Blocks<'a, Records>) ->
     loop {
         done.steps += 1;
         let odd = u64::from(done.steps % 2);
-        let mut step =
-            Step { step: done.steps, code: 2 + odd, last: 3 - odd, faces: 0, pairs: 0, changes: 0, records };
+        let mut step = Step { step: done.steps, code: 2 + odd, last: 3 - odd, faces: 0, pairs: 0, changes: 0, records };
         traverse(tree.root, &mut step);
         done.removed += 2 * step.pairs;
         if step.faces == 0 {

@@ -72,6 +72,18 @@ pub(crate) fn traverse<'a, R, V: Visitor<'a, R>>(node: &'a Node<'a, R>, visitor:
     visitor.leaves(&[Some(node)], state);
 }
 
+/// Passes over the far sides of the root, beyond which there is nothing: so that every cell is the first one at some point.
+pub(crate) fn traverse_far_sides<'a, R, V: Visitor<'a, R>>(root: &'a Node<'a, R>, visitor: &mut V) {
+    let root = Some(root);
+    face::<R, V, 0, 1, 2>([root, None], visitor);
+    face::<R, V, 1, 0, 2>([root, None], visitor);
+    face::<R, V, 2, 0, 1>([root, None], visitor);
+    edge::<R, V, 0, 1, 2>([root, None, None, None], visitor);
+    edge::<R, V, 1, 0, 2>([root, None, None, None], visitor);
+    edge::<R, V, 2, 0, 1>([root, None, None, None], visitor);
+    point([root, None, None, None, None, None, None, None], visitor);
+}
+
 /// The four faces across an axis round the middle of eight nodes.
 #[inline]
 fn faces<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(

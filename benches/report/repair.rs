@@ -54,7 +54,8 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
         &["depth", "surface cells", "pointer: time", "memory", "hash: time", "memory", "ordered: time", "memory"],
         &ratios,
     );
-    report.text += "\nIn ns and bytes a surface cell, and zmend on two threads, by the clock, beside the pointer octree:\n\n";
+    report.text +=
+        "\nIn ns and bytes a surface cell, and zmend on two threads, by the clock, beside the pointer octree:\n\n";
     let absolute: Vec<Vec<String>> = part(&[0, 8, 9, 10, 11, 12, 13, 14]);
     report.text += &table(
         &["depth", "zmend ns", "bytes", "pointer ns", "bytes", "2 threads: clock", "CPU, 2 threads over 1", "memory"],
@@ -81,23 +82,29 @@ fn crossings(mesh: &Mesh, frame: &Frame) -> u64 {
 fn zmend_on(threads: usize, plan: &Plan, mesh: &Mesh, frame: &Frame) -> Cost {
     let options = Options { depth: frame.depth(), inside: Inside::Parity, ..Options::default() };
     on_threads(threads, || {
-        measure(plan.effort, || (), |()| {
-            zmend::repair_into(&mut &*mesh, &options, &mut Sum::default(), &Silent).expect("in memory").crossings
-        })
+        measure(
+            plan.effort,
+            || (),
+            |()| zmend::repair_into(&mut &*mesh, &options, &mut Sum::default(), &Silent).expect("in memory").crossings,
+        )
     })
 }
 
 fn baseline(subject: usize, plan: &Plan, mesh: &Mesh, frame: &Frame) -> Cost {
     let source = &mut &*mesh;
-    measure(plan.effort, || (), |()| {
-        let sink = &mut Sum::default();
-        match subject {
-            0 => pointer_octree::repair(source, frame, sink),
-            1 => cell_map::repair(hash_cells(), source, frame, sink),
-            _ => cell_map::repair(TreeCells::new(), source, frame, sink),
-        }
-        .expect("in memory")
-    })
+    measure(
+        plan.effort,
+        || (),
+        |()| {
+            let sink = &mut Sum::default();
+            match subject {
+                0 => pointer_octree::repair(source, frame, sink),
+                1 => cell_map::repair(hash_cells(), source, frame, sink),
+                _ => cell_map::repair(TreeCells::new(), source, frame, sink),
+            }
+            .expect("in memory")
+        },
+    )
 }
 
 /// Counts hits: what no scan conversion along lines can do without.
@@ -124,9 +131,11 @@ fn stages(plan: &Plan, report: &mut Report) {
     let signed = |crossed| zmend::sign::parity_signs(zmend::sign::close(crossed, &Silent).expect("in memory").0);
     let signs = measure(effort, || crossed.clone(), signed);
     let octree = signed(crossed);
-    let contoured = measure(effort, || (), |()| {
-        zmend::contour::marching_cubes(&octree, &frame, &mut Sum::default(), &Silent).expect("in memory")
-    });
+    let contoured = measure(
+        effort,
+        || (),
+        |()| zmend::contour::marching_cubes(&octree, &frame, &mut Sum::default(), &Silent).expect("in memory"),
+    );
     let zmend = [scanned, signs, contoured];
 
     let fresh = || {
@@ -141,9 +150,11 @@ fn stages(plan: &Plan, report: &mut Report) {
     // Signs may be given again and again: what was spread is spread once more.
     let signs = measure(effort, || (), |()| sign::sign(&tree));
     let counts = sign::sign(&tree);
-    let contoured = measure(effort, || (), |()| {
-        contour::marching_cubes(&tree, &counts, &frame, &mut Sum::default()).expect("in memory")
-    });
+    let contoured = measure(
+        effort,
+        || (),
+        |()| contour::marching_cubes(&tree, &counts, &frame, &mut Sum::default()).expect("in memory"),
+    );
     let pointer = [built, signs, contoured];
     let [leaves, inner] = memory.counts();
 
@@ -155,9 +166,11 @@ fn stages(plan: &Plan, report: &mut Report) {
     cell_map::scan(&mut map, source, &frame).expect("in memory");
     let signs = measure(effort, || (), |()| cell_map::sign(&mut map, depth));
     let (keys, counts) = cell_map::sign(&mut map, depth);
-    let contoured = measure(effort, || (), |()| {
-        cell_map::marching_cubes(&map, &keys, &counts, &frame, &mut Sum::default()).expect("in memory")
-    });
+    let contoured = measure(
+        effort,
+        || (),
+        |()| cell_map::marching_cubes(&map, &keys, &counts, &frame, &mut Sum::default()).expect("in memory"),
+    );
     let hash = [built, signs, contoured];
 
     let rasterised = measure(effort, || (), |()| hits(&mut &mesh, &frame));

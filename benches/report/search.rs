@@ -46,7 +46,8 @@ fn below<M: CellMap<u32>>(map: &M, cell: Key, face: Face, depth: u32) -> u64 {
     if cell.level() >= Some(depth) {
         return 0;
     }
-    let touching = cell.children().into_iter().filter(|kid| kid.corner_in_parent().is_high(face.axis()) != face.is_high());
+    let touching =
+        cell.children().into_iter().filter(|kid| kid.corner_in_parent().is_high(face.axis()) != face.is_high());
     touching.map(|kid| map.get(kid).map_or_else(|| below(map, kid, face, depth), |&record| u64::from(record))).sum()
 }
 
@@ -166,8 +167,9 @@ const QUESTIONS: [&str; 4] = [
 ];
 
 pub(crate) fn report(plan: &Plan, report: &mut Report) {
-    let mut lines: Vec<(String, Vec<(f64, f64)>)> =
-        ["zmend", "pointer octree", "hash entry a leaf", "ordered map"].map(|name| (name.to_owned(), Vec::new())).into();
+    let mut lines: Vec<(String, Vec<(f64, f64)>)> = ["zmend", "pointer octree", "hash entry a leaf", "ordered map"]
+        .map(|name| (name.to_owned(), Vec::new()))
+        .into();
     let mut last = None;
     for depth in plan.search.clone() {
         let found = on_threads(1, || ask_all(plan, depth));

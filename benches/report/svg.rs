@@ -37,7 +37,8 @@ pub(crate) fn plot(title: &str, right: &str, up: &str, lines: &[Line]) -> String
     for decade in decades.0 as i32..=decades.1 as i32 {
         let height = at_y(10f64.powi(decade));
         line(format!(r##"<path d="M{left} {height:.1}H{end}" stroke="#ddd"/>"##));
-        let label = if (0..5).contains(&decade) { format!("{}", 10i32.pow(decade as u32)) } else { format!("1e{decade}") };
+        let label =
+            if (0..5).contains(&decade) { format!("{}", 10i32.pow(decade as u32)) } else { format!("1e{decade}") };
         line(format!(r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#, left - 6.0, height + 4.0));
     }
     for depth in x.0 as i32..=x.1 as i32 {

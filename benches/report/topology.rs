@@ -32,11 +32,15 @@ fn of_zmend(effort: Effort, octree: &SignedOctree) -> Costs {
     let edited = EditedOctree::unedited(octree.clone());
     let bytes = octree.bytes() as f64;
     let mut removed = 0;
-    let mut thin = measure(effort, || (), |()| {
-        let mut complex = Complex::new(&edited, Side::Object);
-        removed = zmend_thin(&mut complex, None, &Silent).expect("not cancelled").removed;
-        complex
-    });
+    let mut thin = measure(
+        effort,
+        || (),
+        |()| {
+            let mut complex = Complex::new(&edited, Side::Object);
+            removed = zmend_thin(&mut complex, None, &Silent).expect("not cancelled").removed;
+            complex
+        },
+    );
     let find = || Loops::find(&edited, Side::Object, f64::INFINITY, &Silent).expect("not cancelled");
     let found = measure(effort, || (), |()| find());
     let loops = find();
@@ -114,7 +118,8 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
         for depth in plan.topology.clone() {
             let (mesh, frame) = input(name, detail, depth);
             let scanned = zmend::sign::scan(&mut &mesh, &frame, false, &Silent).expect("in memory");
-            let octree = zmend::sign::parity_signs(zmend::sign::close(scanned.crossings, &Silent).expect("in memory").0);
+            let octree =
+                zmend::sign::parity_signs(zmend::sign::close(scanned.crossings, &Silent).expect("in memory").0);
             let cells = octree.crossings().len() as f64;
             let zmend = on_threads(1, || of_zmend(plan.effort, &octree));
             let two = on_threads(2, || of_zmend(plan.effort, &octree));
@@ -153,17 +158,23 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
     report.text += "### Topology\n\nAll handles cut. How many times as much the pointer octree takes as zmend, one thread each (and \
                     zmend two, by the clock), and the handles that both find, with the sum of their sizes, pointer octree over zmend:\n\n";
     report.text += &table(
-        &[
-            "solid", "depth", "time", "memory", "thinning", "skeleton, sizes, forest", "2 threads", "handles", "sizes",
-        ],
+        &["solid", "depth", "time", "memory", "thinning", "skeleton, sizes, forest", "2 threads", "handles", "sizes"],
         &ratios,
     );
     report.text += "\nIn ns and bytes a surface cell; and of thinning, in ns an element removed. zmend removes more, for it has no large \
                     leaves:\n\n";
     report.text += &table(
         &[
-            "solid", "depth", "surface cells", "zmend ns", "pointer ns", "zmend bytes", "pointer bytes", "zmend ns an element",
-            "pointer ns an element", "elements, zmend over pointer",
+            "solid",
+            "depth",
+            "surface cells",
+            "zmend ns",
+            "pointer ns",
+            "zmend bytes",
+            "pointer bytes",
+            "zmend ns an element",
+            "pointer ns an element",
+            "elements, zmend over pointer",
         ],
         &absolute,
     );
