@@ -12,9 +12,9 @@ struct Block<T> {
 }
 
 impl<T: Default> Block<T> {
-    fn new() -> Box<Self> {
+    fn new() -> Self {
         let count = (BLOCK / size_of::<T>()).max(1);
-        Box::new(Block { slots: (0..count).map(|_| T::default()).collect(), next: OnceCell::new() })
+        Block { slots: (0..count).map(|_| T::default()).collect(), next: OnceCell::new() }
     }
 }
 
@@ -49,7 +49,7 @@ impl<'a, T: Default> Blocks<'a, T> {
     #[cold]
     fn grow(&'a self) {
         let next = self.current.get().map_or(&self.first, |block| &block.next);
-        self.current.set(Some(next.get_or_init(Block::new)));
+        self.current.set(Some(next.get_or_init(|| Box::new(Block::new()))));
         self.used.set(0);
     }
 

@@ -66,7 +66,7 @@ pub(crate) struct Slot<'a> {
 pub(crate) const THERE: u64 = 0;
 pub(crate) const GONE: u64 = 1;
 
-impl<'a> Slot<'a> {
+impl Slot<'_> {
     #[inline]
     pub(crate) fn tag(self) -> u64 {
         self.leaf.b.get() >> self.shift & 3
@@ -156,7 +156,7 @@ fn same<'a>(a: TopoLink<'a>, b: TopoLink<'a>) -> bool {
 
 /// The face between two leaves; none within one.
 #[inline]
-pub(crate) fn face_slot<'a>(axis: usize, nodes: [TopoLink<'a>; 2]) -> Option<Slot<'a>> {
+pub(crate) fn face_slot(axis: usize, nodes: [TopoLink<'_>; 2]) -> Option<Slot<'_>> {
     if same(nodes[0], nodes[1]) {
         return None;
     }
@@ -166,7 +166,7 @@ pub(crate) fn face_slot<'a>(axis: usize, nodes: [TopoLink<'a>; 2]) -> Option<Slo
 
 /// The edge between four leaves; none within a face or a cell.
 #[inline]
-pub(crate) fn edge_slot<'a>(axis: usize, nodes: [TopoLink<'a>; 4]) -> Option<Slot<'a>> {
+pub(crate) fn edge_slot(axis: usize, nodes: [TopoLink<'_>; 4]) -> Option<Slot<'_>> {
     let [a, b, c, d] = nodes;
     if (same(a, b) && same(c, d)) || (same(a, c) && same(b, d)) {
         return None;
@@ -177,14 +177,14 @@ pub(crate) fn edge_slot<'a>(axis: usize, nodes: [TopoLink<'a>; 4]) -> Option<Slo
 
 /// The point between eight leaves.
 #[inline]
-pub(crate) fn point_slot<'a>(nodes: [TopoLink<'a>; 8]) -> Option<Slot<'a>> {
+pub(crate) fn point_slot(nodes: [TopoLink<'_>; 8]) -> Option<Slot<'_>> {
     let (leaf, k) = owner(&nodes)?;
     Some(Slot { leaf, shift: 2 * (7 - k) as u32 })
 }
 
 /// The faces round an edge.
 #[inline]
-pub(crate) fn faces_round<'a>(axis: usize, [a, b, c, d]: [TopoLink<'a>; 4]) -> [Option<Slot<'a>>; 4] {
+pub(crate) fn faces_round(axis: usize, [a, b, c, d]: [TopoLink<'_>; 4]) -> [Option<Slot<'_>>; 4] {
     let [u, v] = OTHERS[axis];
     [face_slot(v, [a, b]), face_slot(v, [c, d]), face_slot(u, [a, c]), face_slot(u, [b, d])]
 }

@@ -210,8 +210,8 @@ impl Falling {
     #[inline]
     fn offset(&self, axis: usize, at: [i64; 3], shift: u32) -> Option<u16> {
         let (mut value, mut size) = (0.0, 0.0);
-        for a in 0..3 {
-            let part = self.plane[a] * (at[a] - self.corners[0][a]) as f64;
+        for (slope, (at, from)) in self.plane.iter().zip(at.iter().zip(self.corners[0])) {
+            let part = slope * (at - from) as f64;
             value += part;
             size += part.abs();
         }

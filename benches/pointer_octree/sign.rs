@@ -96,12 +96,12 @@ fn descend<'a, R>(
 ) -> u8 {
     match node {
         Node::Inner(inner) => {
-            let mut of = |i: usize, sign: u8| match inner.kids[i].get() {
-                Some(kid) => descend(kid, sign, table, counts, missing),
-                None => {
-                    missing(&inner.kids[i], sign);
-                    sign
+            let mut of = |i: usize, sign: u8| {
+                if let Some(kid) = inner.kids[i].get() {
+                    return descend(kid, sign, table, counts, missing);
                 }
+                missing(&inner.kids[i], sign);
+                sign
             };
             // Of the least child all corners are known then: they are the others' least corners.
             let least = of(0, first);

@@ -22,7 +22,7 @@ pub(crate) struct Thinned {
 
 /// One step.
 struct Step<'a> {
-    step: u32,
+    number: u32,
     /// The tags of what is removed in this step, and of what was in the last one.
     code: u64,
     last: u64,
@@ -40,7 +40,8 @@ pub(crate) fn thin<'a>(tree: &TopoTree<'a>, records: &'a Blocks<'a, Records>) ->
     loop {
         done.steps += 1;
         let odd = u64::from(done.steps % 2);
-        let mut step = Step { step: done.steps, code: 2 + odd, last: 3 - odd, faces: 0, pairs: 0, changes: 0, records };
+        let mut step =
+            Step { number: done.steps, code: 2 + odd, last: 3 - odd, faces: 0, pairs: 0, changes: 0, records };
         traverse(tree.root, &mut step);
         done.removed += 2 * step.pairs;
         if step.faces == 0 {
@@ -63,7 +64,7 @@ impl<'a> Step<'a> {
     #[inline]
     fn remove(&mut self, slot: Slot<'a>) {
         slot.set(self.code);
-        slot.leaf.set_stamp(self.step);
+        slot.leaf.set_stamp(self.number);
         self.changes += 1;
     }
 
@@ -88,7 +89,7 @@ impl<'a> Step<'a> {
             Some(Node::Leaf(leaf)) => leaf.stamp(),
             None => return false,
         };
-        stamp + 1 >= self.step
+        stamp + 1 >= self.number
     }
 
     #[inline]
@@ -139,7 +140,7 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         if self.changes != state {
             for node in nodes.iter().flatten() {
                 if let Node::Inner(inner) = node {
-                    inner.stamp.set(self.step);
+                    inner.stamp.set(self.number);
                 }
             }
         }

@@ -110,7 +110,7 @@ fn edges<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usiz
 }
 
 #[inline]
-fn child<'a, R>(node: Link<'a, R>, i: usize) -> Link<'a, R> {
+fn child<R>(node: Link<'_, R>, i: usize) -> Link<'_, R> {
     node.and_then(|node| node.child(i))
 }
 
@@ -118,7 +118,7 @@ fn child<'a, R>(node: Link<'a, R>, i: usize) -> Link<'a, R> {
 #[inline]
 fn are_leaves<'a, R, V: Visitor<'a, R>>(nodes: &[Link<'a, R>], visitor: &V) -> Option<bool> {
     let divided = nodes.iter().flatten().any(|node| node.is_inner());
-    if !divided { Some(true) } else { visitor.enters(nodes).then_some(false) }
+    if divided { visitor.enters(nodes).then_some(false) } else { Some(true) }
 }
 
 fn face<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(

@@ -48,9 +48,14 @@ pub(crate) struct Report {
 }
 
 impl Report {
+    /// Adds text.
+    pub(crate) fn say(&mut self, text: impl AsRef<str>) {
+        self.text.push_str(text.as_ref());
+    }
+
     /// A plot, with words for who does not see it.
     pub(crate) fn plot(&mut self, name: &'static str, words: &str, svg: String) {
-        self.text += &format!("![{words}](img/{name})\n\n");
+        self.say(format!("![{words}](img/{name})\n\n"));
         self.plots.push((name, svg));
     }
 }

@@ -46,22 +46,22 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
         row.push(times(others[0].peak / two.peak));
         rows.push(row);
     }
-    report.text += "### Whole repair\n\n";
-    report.text += "How many times as much the others take as zmend does, one thread each:\n\n";
+    report.say("### Whole repair\n\n");
+    report.say("How many times as much the others take as zmend does, one thread each:\n\n");
     let part = |columns: &[usize]| rows.iter().map(|row| columns.iter().map(|&c| row[c].clone()).collect()).collect();
     let ratios: Vec<Vec<String>> = part(&[0, 1, 2, 5, 3, 6, 4, 7]);
-    report.text += &table(
+    report.say(table(
         &["depth", "surface cells", "pointer: time", "memory", "hash: time", "memory", "ordered: time", "memory"],
         &ratios,
-    );
+    ));
     report.text +=
         "\nIn ns and bytes a surface cell, and zmend on two threads, by the clock, beside the pointer octree:\n\n";
     let absolute: Vec<Vec<String>> = part(&[0, 8, 9, 10, 11, 12, 13, 14]);
-    report.text += &table(
+    report.say(table(
         &["depth", "zmend ns", "bytes", "pointer ns", "bytes", "2 threads: clock", "CPU, 2 threads over 1", "memory"],
         &absolute,
-    );
-    report.text += "\n";
+    ));
+    report.say("\n");
     let named = |lines: &[Vec<(f64, f64)>; 4]| -> Vec<_> {
         NAMES.iter().map(|name| (*name).to_owned()).zip(lines.iter().cloned()).collect()
     };
@@ -69,7 +69,32 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
     report.plot("repair-time.svg", "Time of a whole repair by depth: flat for each, zmend lowest", svg);
     let svg = plot("Whole repair, peak", "depth", "bytes a surface cell", &named(&lines[1]));
     report.plot("repair-memory.svg", "Peak memory of a whole repair by depth, zmend lowest", svg);
+    others(plan, report);
     on_threads(1, || stages(plan, report));
+}
+
+/// Other samples at one depth, zmend and the pointer octree alone.
+fn others(plan: &Plan, report: &mut Report) {
+    let mut rows = Vec::new();
+    for (name, detail) in [("torus", 1), ("part", 1), ("noisy", 1), ("knot", 1), ("knot", 6)] {
+        let (mesh, frame) = input(name, detail, plan.depth);
+        let cells = crossings(&mesh, &frame) as f64;
+        let zmend = zmend_on(1, plan, &mesh, &frame);
+        let pointer = on_threads(1, || baseline(0, plan, &mesh, &frame));
+        rows.push(vec![
+            format!("{name}, detail {detail}"),
+            mesh.faces.len().to_string(),
+            format!("{cells}"),
+            times(pointer.cpu / zmend.cpu),
+            times(pointer.peak / zmend.peak),
+            number(1e9 * zmend.cpu / cells),
+            number(1e9 * pointer.cpu / cells),
+        ]);
+    }
+    report.say(format!("Other inputs, depth {}:\n\n", plan.depth));
+    let head =
+        ["input", "polygons", "surface cells", "pointer: time", "memory", "zmend ns a cell", "pointer ns a cell"];
+    report.say(table(&head, &rows) + "\n");
 }
 
 /// Crossed edges.
@@ -178,14 +203,14 @@ fn stages(plan: &Plan, report: &mut Report) {
     let swept = measure(effort, || vec![1u64; octree.bytes() / 8], |words| words.iter().fold(0, |a, b| a ^ b));
     let limits = [("hits alone", rasterised), ("one pass over the octree", swept), ("output alone", output)];
 
-    report.text += &format!("### Stages, depth {depth}\n\n");
-    report.text += &format!(
+    report.say(format!("### Stages, depth {depth}\n\n"));
+    report.say(format!(
         "The pointer octree has {leaves} leaves and {inner} inner nodes, {} bytes a surface cell; zmend's takes {}. \
          The limit is what the stage cannot do without: the exact rasterisation of all triangles, one reading of the octree, making points and \
          triangles of which nothing has to be found out. In ns a surface cell, one thread:\n\n",
         number((24 * leaves + 88 * inner) as f64 / cells),
         number(octree.bytes() as f64 / cells),
-    );
+    ));
     let rows: Vec<Vec<String>> = ["build from triangles", "close, signs", "contour"]
         .iter()
         .enumerate()
@@ -203,11 +228,11 @@ fn stages(plan: &Plan, report: &mut Report) {
             ]
         })
         .collect();
-    report.text += &table(
+    report.say(table(
         &["stage", "pointer over zmend", "hash over zmend", "zmend", "pointer", "hash", "limit", "zmend over limit"],
         &rows,
-    );
-    report.text += "\n";
+    ));
+    report.say("\n");
 }
 
 /// All triangles rasterised, and the hits forgotten.

@@ -179,11 +179,11 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
         last = Some((depth, found));
     }
     let Some((depth, ([zmend, pointer, hash, ordered], leaves))) = last else { return };
-    report.text += &format!("### Search and neighbours, depth {depth}\n\n");
-    report.text += &format!(
+    report.say(format!("### Search and neighbours, depth {depth}\n\n"));
+    report.say(format!(
         "Octrees with the same {leaves} leaves of all sizes, which fill the root, and four bytes kept for each (the pointer octree's leaves \
          have room for twenty). How many times as long the others take, then ns:\n\n"
-    );
+    ));
     let row = |name: &str, of: &dyn Fn(&Answers) -> f64| {
         let base = of(&zmend);
         let mut row = vec![name.to_owned()];
@@ -194,7 +194,7 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
     let mut rows = vec![row("bytes a leaf", &|answers| answers.bytes)];
     rows.extend(QUESTIONS.iter().enumerate().map(|(i, name)| row(name, &|answers| answers.times[i])));
     let head = ["", "pointer", "hash", "ordered", "zmend", "pointer", "hash", "ordered"];
-    report.text += &(table(&head, &rows) + "\n");
+    report.say(table(&head, &rows) + "\n");
     let svg = plot("The leaf at the centre of a random leaf", "depth", "ns", &lines);
     report.plot("search-time.svg", "Time of a search by depth", svg);
 }

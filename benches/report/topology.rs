@@ -92,6 +92,10 @@ fn of_pointers(effort: Effort, name: &str, detail: u32, depth: u32) -> Costs {
     }
 }
 
+fn thinned<M: CellMap<u32> + Clone>(effort: Effort, map: &M, depth: u32) -> Cost {
+    measure(effort, || map.clone(), |mut map| element_map::thin(&mut map, depth))
+}
+
 /// Thinning with an entry an element: seconds and elements removed.
 fn of_maps(plan: &Plan, name: &str, detail: u32, depth: u32) -> ([Cost; 2], u64) {
     let (mesh, frame) = input(name, detail, depth);
@@ -103,9 +107,6 @@ fn of_maps(plan: &Plan, name: &str, detail: u32, depth: u32) -> ([Cost; 2], u64)
     element_map::fill(&tree, &mut filled);
     let ordered: TreeCells<u32> = filled.iter().map(|(&key, &removed)| (key, removed)).collect();
     let removed = element_map::thin(&mut filled.clone(), depth).removed;
-    fn thinned<M: CellMap<u32> + Clone>(effort: Effort, map: &M, depth: u32) -> Cost {
-        measure(effort, || map.clone(), |mut map| element_map::thin(&mut map, depth))
-    }
     ([thinned(plan.effort, &filled, depth), thinned(plan.effort, &ordered, depth)], removed)
 }
 
@@ -155,15 +156,15 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
         lines.push((format!("{name}, zmend"), zmend));
         lines.push((format!("{name}, pointer"), pointer));
     }
-    report.text += "### Topology\n\nAll handles cut. How many times as much the pointer octree takes as zmend, one thread each (and \
-                    zmend two, by the clock), and the handles that both find, with the sum of their sizes, pointer octree over zmend:\n\n";
-    report.text += &table(
+    report.say("### Topology\n\nAll handles cut. How many times as much the pointer octree takes as zmend, one thread each (and \
+                    zmend two, by the clock), and the handles that both find, with the sum of their sizes, pointer octree over zmend:\n\n");
+    report.say(table(
         &["solid", "depth", "time", "memory", "thinning", "skeleton, sizes, forest", "2 threads", "handles", "sizes"],
         &ratios,
-    );
-    report.text += "\nIn ns and bytes a surface cell; and of thinning, in ns an element removed. zmend removes more, for it has no large \
-                    leaves:\n\n";
-    report.text += &table(
+    ));
+    report.say("\nIn ns and bytes a surface cell; and of thinning, in ns an element removed. zmend removes more, for it has no large \
+                    leaves:\n\n");
+    report.say(table(
         &[
             "solid",
             "depth",
@@ -177,8 +178,8 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
             "elements, zmend over pointer",
         ],
         &absolute,
-    );
-    report.text += "\n";
+    ));
+    report.say("\n");
     lines.truncate(4);
     let svg = plot("All handles cut, one thread", "depth", "ns a surface cell", &lines);
     report.plot("topology-time.svg", "Time of a topology repair by depth", svg);
@@ -195,7 +196,7 @@ fn maps(plan: &Plan, report: &mut Report) {
     let zmend = on_threads(1, || of_zmend(plan.effort, &octree));
     let element = |cost: Cost, removed: u64| 1e9 * cost.cpu / removed as f64;
     let base = element(zmend.thin, zmend.removed);
-    report.text += &format!(
+    report.say(format!(
         "Thinning with an entry for each element of the solid, `{name}` at depth {depth}, in ns an element removed: {} in a hash table, {} times \
          what zmend takes ({}); {} in an ordered map, {} times.\n",
         number(element(hash, removed)),
@@ -203,5 +204,5 @@ fn maps(plan: &Plan, report: &mut Report) {
         number(base),
         number(element(ordered, removed)),
         times(element(ordered, removed) / base),
-    );
+    ));
 }
