@@ -17,6 +17,7 @@ use super::node::{Leaf, Link, Memory, Node, Tree};
 use super::sign::CORNERS;
 use super::traverse::{BIT, OTHERS};
 use std::cell::Cell;
+use zmend::glam::Vec3;
 use zmend::grid::{Edge, Face};
 
 /// What a leaf keeps beside: the records of its faces, if one has any.
@@ -128,8 +129,9 @@ impl<'a> TopoLeaf<'a> {
 
     /// The centre, in half finest cells.
     #[inline]
-    pub(crate) fn centre(&self) -> [f32; 3] {
-        self.at().map(|c| (2 * c + (1 << self.size())) as f32)
+    pub(crate) fn centre(&self) -> Vec3 {
+        let ([x, y, z], half) = (self.at(), 1 << self.size());
+        Vec3::new((2 * x + half) as f32, (2 * y + half) as f32, (2 * z + half) as f32)
     }
 }
 
@@ -198,17 +200,11 @@ pub(crate) fn nodes_round<'a>(nodes: &[TopoLink<'a>; 8], axis: usize, up: bool) 
 
 /// The area of the quadrilateral through the centres of the leaves round an edge, in square finest cells.
 pub(crate) fn dual_area(nodes: [TopoLink<'_>; 4]) -> f32 {
-    let [a, b, c, d] = nodes.map(|node| node.and_then(Node::leaf).map_or([0.0; 3], TopoLeaf::centre));
-    let triangle = |p: [f32; 3], q: [f32; 3], r: [f32; 3]| {
-        let (e, f): ([f32; 3], [f32; 3]) = (std::array::from_fn(|i| q[i] - p[i]), std::array::from_fn(|i| r[i] - p[i]));
-        let n: [f32; 3] = std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            e[j] * f[k] - e[k] * f[j]
-        });
-        n.iter().map(|c| c * c).sum::<f32>().sqrt() / 2.0
-    };
-    // Centres count half cells.
-    (triangle(a, b, c) + triangle(d, b, c)) / 4.0
+    let centre = |node: TopoLink<'_>| node.and_then(Node::leaf).map_or(Vec3::ZERO, TopoLeaf::centre);
+    let [a, b, c, d] = nodes;
+    let (a, b, c, d) = (centre(a), centre(b), centre(c), centre(d));
+    // Two triangles, and centres count half cells.
+    ((b - a).cross(c - a).length() + (b - d).cross(c - d).length()) / 8.0
 }
 
 /// Gives every leaf its place and size, and its elements tags: there if all corners are inside.

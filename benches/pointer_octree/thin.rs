@@ -155,10 +155,7 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         if !self.any_active(&nodes) {
             return;
         }
-        let Some(face) = face_slot(axis, nodes) else { return };
-        if !self.is_there(face) {
-            return;
-        }
+        let Some(face) = face_slot(axis, nodes).filter(|&slot| self.is_there(slot)) else { return };
         let cell = |node: TopoLink<'a>| node.and_then(Node::leaf).map(TopoLeaf::cell);
         if let Some(cell) = self.only([cell(nodes[0]), cell(nodes[1])]) {
             self.remove(face);
@@ -173,10 +170,7 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         if !self.any_active(&nodes) {
             return;
         }
-        let Some(edge) = edge_slot(axis, nodes) else { return };
-        if !self.is_there(edge) {
-            return;
-        }
+        let Some(edge) = edge_slot(axis, nodes).filter(|&slot| self.is_there(slot)) else { return };
         let faces = faces_round(axis, nodes);
         if let Some(face) = self.only(faces) {
             let weight = faces.into_iter().flatten().map(|face| face.record().weight).sum::<f32>() + dual_area(nodes);
@@ -193,10 +187,7 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         if !self.any_active(&nodes) {
             return;
         }
-        let Some(point) = point_slot(nodes) else { return };
-        if !self.is_there(point) {
-            return;
-        }
+        let Some(point) = point_slot(nodes).filter(|&slot| self.is_there(slot)) else { return };
         let along = |axis: usize, up: bool| edge_slot(axis, nodes_round(&nodes, axis, up));
         let edges = [along(0, false), along(0, true), along(1, false), along(1, true), along(2, false), along(2, true)];
         if let Some(edge) = self.only(edges) {
