@@ -136,7 +136,7 @@ impl<'a> Visitor<'a, Beside<'a>> for Step<'a> {
         self.changes
     }
 
-    fn leaves(&mut self, nodes: &[TopoLink<'a>], state: u64) {
+    fn leave(&mut self, nodes: &[TopoLink<'a>], state: u64) {
         if self.changes != state {
             for node in nodes.iter().flatten() {
                 if let Node::Inner(inner) = node {

@@ -27,20 +27,24 @@ pub(crate) trait Visitor<'a, R> {
     /// Whether to look into elements between these nodes, one of which is divided.
     fn enters(&self, nodes: &[Link<'a, R>]) -> bool;
 
-    /// What is worth remembering while one is between nodes; it is told again in [`leaves`](Self::leaves).
+    /// What is worth remembering while one is between nodes; it is told again in [`leave`](Self::leave).
     fn state(&self) -> u64 {
         0
     }
 
     /// All between these nodes has been seen.
-    fn leaves(&mut self, _nodes: &[Link<'a, R>], _state: u64) {}
+    fn leave(&mut self, _nodes: &[Link<'a, R>], _state: u64) {}
 
+    /// A leaf.
     fn cell(&mut self, _leaf: &'a Leaf<R>) {}
 
+    /// The face across an axis between two nodes.
     fn face(&mut self, _axis: usize, _nodes: [Link<'a, R>; 2]) {}
 
+    /// The edge along an axis between four nodes.
     fn edge(&mut self, _axis: usize, _nodes: [Link<'a, R>; 4]) {}
 
+    /// The point between eight nodes.
     fn point(&mut self, _nodes: [Link<'a, R>; 8]) {}
 }
 
@@ -69,7 +73,7 @@ pub(crate) fn traverse<'a, R, V: Visitor<'a, R>>(node: &'a Node<'a, R>, visitor:
     if V::POINTS {
         point(kids, visitor);
     }
-    visitor.leaves(&[Some(node)], state);
+    visitor.leave(&[Some(node)], state);
 }
 
 /// Passes over the far sides of the root, beyond which there is nothing: so that every cell is the first one at some point.
@@ -144,7 +148,7 @@ fn face<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
     if V::POINTS {
         point(round, visitor);
     }
-    visitor.leaves(&nodes, state);
+    visitor.leave(&nodes, state);
 }
 
 fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize>(
@@ -165,7 +169,7 @@ fn edge<'a, R, V: Visitor<'a, R>, const A: usize, const U: usize, const W: usize
     if V::POINTS {
         point(round, visitor);
     }
-    visitor.leaves(&nodes, state);
+    visitor.leave(&nodes, state);
 }
 
 fn point<'a, R, V: Visitor<'a, R>>(nodes: [Link<'a, R>; 8], visitor: &mut V) {
@@ -176,5 +180,5 @@ fn point<'a, R, V: Visitor<'a, R>>(nodes: [Link<'a, R>; 8], visitor: &mut V) {
     }
     let state = visitor.state();
     point(by_index!(|i: usize| child(nodes[i], 7 - i); 0 1 2 3 4 5 6 7), visitor);
-    visitor.leaves(&nodes, state);
+    visitor.leave(&nodes, state);
 }
