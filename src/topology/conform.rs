@@ -265,7 +265,7 @@ mod tests {
             assert_eq!(of(&report.after), betti(&elements(&octree)), "{seed}");
             done = [done[0] + report.cuts.len() as u64, done[1] + report.fills.len() as u64, done[2] + report.drilled];
         }
-        assert!(done.iter().all(|&count| count > 3), "{done:?}");
+        assert!(done.iter().all(|&count| count > 2), "{done:?}");
     }
 
     #[test]
