@@ -66,9 +66,13 @@ pub(crate) fn report(plan: &Plan, report: &mut Report) {
         NAMES.iter().map(|name| (*name).to_owned()).zip(lines.iter().cloned()).collect()
     };
     let svg = plot("Whole repair, one thread", "depth", "ns a surface cell", &named(&lines[0]));
-    report.plot("repair-time.svg", "Time of a whole repair by depth: flat for each, zmend lowest", svg);
+    report.plot(
+        "repair-time.svg",
+        "Time of a whole repair by depth: zmend takes least from start to end, maps with an entry a cell grow",
+        svg,
+    );
     let svg = plot("Whole repair, peak", "depth", "bytes a surface cell", &named(&lines[1]));
-    report.plot("repair-memory.svg", "Peak memory of a whole repair by depth, zmend lowest", svg);
+    report.plot("repair-memory.svg", "Peak memory of a whole repair by depth: zmend takes least", svg);
     others(plan, report);
     on_threads(1, || stages(plan, report));
 }
