@@ -60,7 +60,7 @@ impl Mesh {
     }
 
     /// [`self_intersections_up_to`](Self::self_intersections_up_to), but only pairs of which one is face `from` or a later one.
-    pub(super) fn intersections_from(&self, from: u32, limit: usize) -> Option<Vec<[u32; 2]>> {
+    pub(crate) fn intersections_from(&self, from: u32, limit: usize) -> Option<Vec<[u32; 2]>> {
         let tree = TriangleTree::new(self);
         let slivers = Slivers::new(&tree);
         let mut pieces = Vec::new();

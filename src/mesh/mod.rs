@@ -10,7 +10,9 @@ mod heal;
 mod intersect;
 mod meet;
 mod oriented;
+pub(crate) mod parts;
 mod polygon;
+mod ray;
 mod report;
 pub mod sample;
 mod source;
@@ -28,6 +30,7 @@ pub use features::{Chain, Constraint, Constraints, FeatureOptions, Features, Gro
 pub use gaps::Gap;
 pub use heal::{Defects, HealOptions, HealStep, Healed};
 pub use polygon::triangulate;
+pub use ray::RayHit;
 pub use report::Report;
 pub(crate) use source::Batch;
 pub use stream::{MeshSink, MeshSizes, SourceCounts, TriangleSource};

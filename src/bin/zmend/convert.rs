@@ -19,12 +19,17 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<ExitCode> {
 /// Writes a mesh with as many digits as it needs, and returns the size of the file.
 pub(crate) fn write(path: &Path, mesh: &Mesh, is_text: bool) -> Result<u64> {
     let format = goal::mesh_format(path)?;
-    let is_single = mesh.points.iter().all(|p| p.as_vec3().as_dvec3() == *p || !p.is_finite());
+    let is_single = is_single(mesh);
     let precision = if is_single { Precision::Single } else { Precision::Double };
     if !is_single && format.is_single(is_text) {
         print::warning(format_args!("{}: {format} has 32 bits a coordinate, the mesh needs more", path.display()));
     }
     interrupt::noted(|| io::write(path, mesh, WriteOptions { precision, is_text, ..WriteOptions::default() }))
+}
+
+/// Whether 32 bits hold all coordinates as they are.
+pub(crate) fn is_single(mesh: &Mesh) -> bool {
+    mesh.points.iter().all(|p| p.as_vec3().as_dvec3() == *p || !p.is_finite())
 }
 
 /// What was written, in words.

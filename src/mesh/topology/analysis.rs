@@ -112,15 +112,8 @@ impl Topology<'_> {
     }
 
     fn has_bow_ties(&self) -> bool {
-        let points = 0..self.corners.points() as u32;
-        let init = super::Star::default;
-        points
-            .into_par_iter()
-            .map_init(init, |star, point| {
-                star.visit(&self.corners, point);
-                star.fans() > 1
-            })
-            .any(|is_tie| is_tie)
+        let points = (0..self.corners.points() as u32).into_par_iter();
+        points.map_init(super::Star::default, |star, point| self.fans_with(star, point) > 1).any(|is_tie| is_tie)
     }
 
     /// Kind, orientability, spikes and rims. O(n).

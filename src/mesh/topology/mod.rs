@@ -266,7 +266,11 @@ impl<'a> Topology<'a> {
     /// Number of fans at a point: sets of corners that hang together by edges. 0 if no sound face uses the point, more than one at a
     /// bow-tie.
     pub fn fans(&self, point: u32) -> u32 {
-        let mut star = Star::default();
+        self.fans_with(&mut Star::default(), point)
+    }
+
+    /// The same, with a star that is moved from point to point.
+    pub(in crate::mesh) fn fans_with(&self, star: &mut Star, point: u32) -> u32 {
         star.visit(&self.corners, point);
         star.fans()
     }
