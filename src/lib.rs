@@ -113,8 +113,8 @@ pub use error::{Error, Place, Result};
 pub use glam;
 pub use mesh::{Mesh, Polygons};
 pub use repair::{
-    Faces, Inside, Keep, Mended, Offset, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair,
-    repair_into, repair_keeping_good, solidify,
+    Faces, Inside, Keep, Mended, Offset, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into,
+    repair_keeping_good, solidify,
 };
 
 /// The examples of the README are tests.

@@ -4,6 +4,7 @@ pub(crate) mod chance;
 mod corners;
 mod distance;
 mod edit;
+mod fans;
 mod features;
 mod gaps;
 mod heal;

@@ -161,7 +161,8 @@ impl Mesh {
         }
         let mut is_spoilt = vec![false; count];
         for part in 0..count {
-            is_spoilt[nests.root(part as u32) as usize] |= fates[part] != Fate::Good || !fits[part] || first[part] < from;
+            is_spoilt[nests.root(part as u32) as usize] |=
+                fates[part] != Fate::Good || !fits[part] || first[part] < from;
         }
         for part in 0..count {
             if fates[part] == Fate::Good && is_spoilt[nests.root(part as u32) as usize] {
@@ -206,7 +207,8 @@ mod tests {
         let mut ball = sample::build("sphere", 1).unwrap();
         ball.points.iter_mut().for_each(|p| *p = radius * *p + x * DVec3::X);
         if !outward {
-            ball.faces = ball.faces.iter().map(|f| [f[0], f[2], f[1]]).collect::<Vec<_>>().iter().map(|f| &f[..]).collect();
+            ball.faces =
+                ball.faces.iter().map(|f| [f[0], f[2], f[1]]).collect::<Vec<_>>().iter().map(|f| &f[..]).collect();
         }
         ball
     }

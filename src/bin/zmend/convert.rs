@@ -2,6 +2,7 @@
 
 use crate::args::ConvertArgs;
 use crate::{goal, interrupt, print, units};
+use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
 use zmend::io::{self, Precision, WriteOptions};
@@ -9,10 +10,17 @@ use zmend::{Mesh, Result};
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<ExitCode> {
     goal::mesh_format(&args.out)?;
-    goal::check(&args.out, &[&args.input], args.force)?;
+    goal::check(&args.out, &[&args.input], args.output.force)?;
     let mesh = io::read(&args.input)?;
     let bytes = write(&args.out, &mesh, args.ascii)?;
-    print::out(&format!("{}\n", told(&args.out, &mesh, bytes)))?;
+    if args.output.json {
+        let (vertices, faces) = (mesh.points.len(), mesh.faces.len());
+        let path = args.out.display().to_string();
+        let told = json!({ "path": path, "bytes": bytes, "vertices": vertices, "faces": faces });
+        print::out(&format!("{told}\n"))?;
+    } else {
+        print::out(&format!("{}\n", told(&args.out, &mesh, bytes)))?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -13,8 +13,8 @@ use zmend::{Result, io};
 
 pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
     goal::mesh_format(&args.out)?;
-    goal::check(&args.out, &[&args.input], args.force)?;
-    let bars = Bars::new(!args.json);
+    goal::check(&args.out, &[&args.input], args.output.force)?;
+    let bars = Bars::new(!args.output.json);
     bars.start("read", 0);
     let mesh = io::read(&args.input)?;
     let (tolerance, is_absolute) = match args.tolerance {
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
     bars.start("write", 0);
     let bytes = convert::write(&args.out, &healed.mesh, false)?;
     drop(bars);
-    if args.json {
+    if args.output.json {
         let told = json!({
             "path": args.out.display().to_string(),
             "bytes": bytes,
@@ -113,6 +113,8 @@ fn verdict(is_healed: bool, is_unchanged: bool) -> &'static str {
     match (is_healed, is_unchanged) {
         (true, true) => "nothing to heal",
         (true, false) => "healed: closed, manifold, oriented",
-        (false, _) => "what is left needs more: zmend repair --keep-good makes a solid of it, and keeps the components that are good",
+        (false, _) => {
+            "what is left needs more: zmend repair --keep-good makes a solid of it, and keeps the components that are good"
+        }
     }
 }

@@ -104,7 +104,8 @@ fn components(kept: &KeptParts) -> serde_json::Value {
 fn words(mended: &Mended) -> String {
     let kept = &mended.kept;
     let all = counted(kept.parts, "component", "components");
-    let mut text = format!("{} of {all} kept, {} of {} faces\n", count(kept.kept), count(kept.kept_faces), count(kept.faces));
+    let mut text =
+        format!("{} of {all} kept, {} of {} faces\n", count(kept.kept), count(kept.kept_faces), count(kept.faces));
     let reasons = [
         (kept.defective, "not closed, manifold and oriented"),
         (kept.meeting, "passing through or touching themselves or others"),
