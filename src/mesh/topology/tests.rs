@@ -247,13 +247,13 @@ fn fans_and_books_are_no_worse_than_others() {
     // Every other triangle of a fan: as many rims as triangles meet in its tip.
     (1..n).step_by(2).for_each(|i| mesh.faces.push(&[0, i, i + 1]));
     let topology = Topology::new(&mesh);
-    assert_eq!((topology.fans(0), topology.boundary_loops().len()), (n as u32 / 2, n as usize / 2));
+    assert_eq!((topology.fans(0), topology.boundary_loops().len()), (n / 2, n as usize / 2));
     assert!(topology.kind().has_bow_ties);
     // A book: all triangles along one edge.
     mesh.faces = (2..n).map(|i| [0, 1, i]).collect::<Vec<_>>().iter().map(|f| &f[..]).collect();
     let topology = Topology::new(&mesh);
     assert_eq!(topology.edges().count(), 2 * (n as usize - 2) + 1);
-    assert_eq!((topology.count(0), topology.neighbour(3)), (n as u32 - 2, Neighbour::Many(n as u32 - 3)));
+    assert_eq!((topology.count(0), topology.neighbour(3)), (n - 2, Neighbour::Many(n - 3)));
     assert_eq!(topology.breadth_first(7).map(|step| step.1).max(), Some(1));
     let found = topology.diagnose();
     assert!(found.kind.has_non_manifold_edges && found.is_orientable);
