@@ -7,6 +7,7 @@ use crate::measure::Measured;
 use crate::units::{bytes, count, counted, real, time};
 use crate::{convert, digits, goal, heal, interrupt, json, memory, print, repair};
 use serde_json::json;
+use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -116,7 +117,7 @@ fn words(mended: &Mended) -> String {
         reasons.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n))).collect();
     if let Some(report) = &mended.rebuilt {
         let cell = real(report.frame.cell_size());
-        text += &format!("made anew with cells of {cell}: {}\n", reasons.join("; "));
+        let _ = writeln!(text, "made anew with cells of {cell}: {}", reasons.join("; "));
         let memory = memory::peak().map(bytes);
         text += &memory.map_or(String::new(), |memory| format!("{memory} of memory\n"));
     }

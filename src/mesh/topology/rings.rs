@@ -9,7 +9,9 @@
 //!
 //! # Cost
 //!
-//! Six passes over the corners in order, and one random write a side. Beside what stays, 9 bytes a triangle while it is made.
+//! Six passes over the corners in order, and one random write a side. Beside what stays, 9 bytes a triangle while it is made. Ten million
+//! triangles take 1.4 s of CPU time if faces are shuffled, where looking from the points takes 3.5, and 0.9 if they are in order, where that
+//! takes 0.5.
 
 use super::super::corners::Corners;
 use super::super::star::repeated;
