@@ -6,28 +6,29 @@ use super::lattice::{Lattice, place};
 use super::run::Extractor;
 use super::slice::Slice;
 use super::window::Window;
+use crate::grid::Edge;
 use crate::grid::brick::Bits;
 use crate::grid::cases::{CASES, Mask};
-use crate::grid::{Axis, Edge};
 use crate::volume::Volume;
 use glam::DVec3;
 
 /// The triangles of all cases, as edges of the cell.
 pub(super) struct Triangles {
-    /// Those of case m are at `starts[m] .. starts[m + 1]`.
+    /// Those of a case are between its ends.
     edges: Vec<u8>,
-    starts: [u16; 257],
+    ends: [[u16; 2]; 256],
 }
 
 impl Triangles {
     /// Counter-clockwise seen from outside, or clockwise if they are `turned`.
     pub(super) fn new(turned: bool) -> Self {
-        let mut triangles = Triangles { edges: Vec::new(), starts: [0; 257] };
-        for (case, end) in CASES.iter().zip(1..) {
+        let mut triangles = Triangles { edges: Vec::new(), ends: [[0; 2]; 256] };
+        for (case, mask) in CASES.iter().zip(0..) {
+            let start = triangles.edges.len() as u16;
             for [a, b, c] in case.triangles.iter().map(|t| t.map(|e: Edge| e.index() as u8)) {
                 triangles.edges.extend(if turned { [a, c, b] } else { [a, b, c] });
             }
-            triangles.starts[end] = triangles.edges.len() as u16;
+            triangles.ends[mask] = [start, triangles.edges.len() as u16];
         }
         triangles
     }
@@ -35,7 +36,7 @@ impl Triangles {
     /// The corners of the triangles of a case, three for each.
     #[inline]
     pub(super) fn of(&self, mask: Mask) -> &[u8] {
-        let [start, end] = [0, 1].map(|i| usize::from(self.starts[usize::from(mask) + i]));
+        let [start, end] = self.ends[usize::from(mask)].map(usize::from);
         &self.edges[start..end]
     }
 }
@@ -95,16 +96,6 @@ impl<V: Volume> Extractor for Cubes<'_, V> {
 /// Appends the points on the crossed edges of a slice, in order, in model units.
 #[inline]
 pub(super) fn edge_points<V: Volume>(lattice: &Lattice<'_, V>, slice: &Slice, z: usize, points: &mut Vec<DVec3>) {
-    for y in 0..slice.rows() {
-        for word in slice.row(y) {
-            let first = [64 * word.x as usize, y, z];
-            let start = lattice.to_model(place(first));
-            for (axis, along) in Axis::ALL.into_iter().zip(lattice.steps()) {
-                for x in Bits(word.crossed[axis.index()]) {
-                    let t = lattice.crossing([first[0] + x as usize, y, z], axis);
-                    points.push(start + lattice.steps()[0] * f64::from(x) + along * t);
-                }
-            }
-        }
-    }
+    let steps = lattice.steps();
+    lattice.crossings_of(slice, z, |at, axis, t| points.push(lattice.to_model(place(at)) + steps[axis.index()] * t));
 }

@@ -123,7 +123,10 @@ mod tests {
     fn tunnels_are_bands() {
         let all = all(true);
         let tunnels: Vec<usize> = (0..256).filter(|&mask| CASES[mask].has_tunnel()).collect();
-        assert_eq!(tunnels, [24, 36, 66, 129].map(|outside: usize| 255 - outside).into_iter().rev().collect::<Vec<_>>());
+        assert_eq!(
+            tunnels,
+            [24, 36, 66, 129].map(|outside: usize| 255 - outside).into_iter().rev().collect::<Vec<_>>()
+        );
         for mask in tunnels {
             let (list, cycles) = (&all[mask].list, &CASES[mask].cycles);
             assert_eq!(list.len(), 3);
