@@ -3,16 +3,18 @@
 use super::*;
 use std::collections::BTreeMap;
 
+/// The least point that a point is joined to.
+fn root(parents: &mut [u32], mut point: u32) -> u32 {
+    while parents[point as usize] != point {
+        parents[point as usize] = parents[parents[point as usize] as usize];
+        point = parents[point as usize];
+    }
+    point
+}
+
 /// The Euler numbers of the components, sorted: for closed surfaces, components and the genus of each.
 fn topology(mesh: &Mesh) -> Vec<i64> {
     let mut parents: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    fn root(parents: &mut [u32], mut point: u32) -> u32 {
-        while parents[point as usize] != point {
-            parents[point as usize] = parents[parents[point as usize] as usize];
-            point = parents[point as usize];
-        }
-        point
-    }
     for side in mesh.faces.iter().flat_map(|face| face.windows(2)) {
         let [a, b] = [0, 1].map(|i| root(&mut parents, side[i]));
         parents[a.max(b) as usize] = a.min(b);
