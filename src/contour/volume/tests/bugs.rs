@@ -3,12 +3,6 @@
 use super::*;
 use crate::volume::Cropped;
 
-fn extracted(volume: &impl Volume, options: &ExtractOptions) -> Mesh {
-    let mut mesh = Mesh::default();
-    extract(volume, options, &mut mesh, &Silent).unwrap();
-    mesh
-}
-
 fn by(method: Method) -> ExtractOptions {
     ExtractOptions { method, ..ExtractOptions::default() }
 }
@@ -134,7 +128,7 @@ fn what_a_mesh_held_is_replaced() {
     for method in METHODS {
         let once = extracted(&ball, &by(method));
         let mut twice = once.clone();
-        extract(&ball, &by(method), &mut twice, &Silent).unwrap();
+        extract(&(&ball as &dyn Volume), &by(method), &mut twice, &Silent).unwrap();
         assert!(once == twice, "{method:?}");
     }
 }

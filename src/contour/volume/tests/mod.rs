@@ -34,11 +34,15 @@ fn surface(values: &[f32], size: [usize; 3], options: &ExtractOptions) -> Mesh {
     mesh
 }
 
-fn cells(size: usize, field: impl Fn(DVec3) -> f64 + Sync, method: Method) -> Mesh {
+/// The surface of any volume, behind one type: so extractors are compiled once for all of them.
+fn extracted(volume: &dyn Volume, options: &ExtractOptions) -> Mesh {
     let mut mesh = Mesh::default();
-    let options = ExtractOptions { method, ..ExtractOptions::default() };
-    extract(&LevelSet::new([size; 3], field), &options, &mut mesh, &Silent).unwrap();
+    extract(&volume, options, &mut mesh, &Silent).unwrap();
     mesh
+}
+
+fn cells(size: usize, field: impl Fn(DVec3) -> f64 + Sync, method: Method) -> Mesh {
+    extracted(&LevelSet::new([size; 3], field), &ExtractOptions { method, ..ExtractOptions::default() })
 }
 
 const METHODS: [Method; 5] = [
@@ -87,9 +91,7 @@ fn placements_are_honoured() {
         let placement = Placement { origin: DVec3::new(100.0, -20.0, 7.0), axes };
         let centre = placement.to_model(middle);
         let field = LevelSet::new([25, 25, 49], |p: DVec3| 9.0 - (axes * (p - middle)).length());
-        let mut mesh = Mesh::default();
-        extract(&field, &ExtractOptions { method, placement, ..ExtractOptions::default() }, &mut mesh, &Silent)
-            .unwrap();
+        let mesh = extracted(&field, &ExtractOptions { method, placement, ..ExtractOptions::default() });
         assert_eq!(mesh.validate(), Ok(()));
         let report = mesh.report();
         assert!(
@@ -106,28 +108,19 @@ fn placements_are_honoured() {
 fn borders_close_or_stay_open() {
     let full = [1u8; 60];
     for method in METHODS {
-        let mut closed = Mesh::default();
         let dense = Dense::new(&full, [3, 4, 5]).unwrap();
         let options = ExtractOptions { method, level: Level::above(0.5), ..ExtractOptions::default() };
-        extract(&dense, &options, &mut closed, &Silent).unwrap();
+        let closed = extracted(&dense, &options);
         assert_eq!(closed.validate(), Ok(()));
         let bounds = closed.report().bounds;
         let limit = if matches!(method, Method::SurfaceNets) { 0.25 } else { 1e-3 };
         assert!((bounds.min + 0.5).abs().max_element() < limit, "{method:?} {bounds:?}");
         assert!((bounds.max - DVec3::new(2.5, 3.5, 4.5)).abs().max_element() < limit, "{method:?} {bounds:?}");
-        let mut open = Mesh::default();
-        extract(&dense, &ExtractOptions { border: Border::Open, ..options }, &mut open, &Silent).unwrap();
+        let open = extracted(&dense, &ExtractOptions { border: Border::Open, ..options });
         assert_eq!((open.points.len(), open.faces.len()), (0, 0));
         // Half a ball on the border has a rim there.
         let half = LevelSet::new([20, 20, 10], |p: DVec3| 7.2 - (p - DVec3::new(9.6, 9.7, 0.0)).length());
-        let mut bowl = Mesh::default();
-        extract(
-            &half,
-            &ExtractOptions { method, border: Border::Open, ..ExtractOptions::default() },
-            &mut bowl,
-            &Silent,
-        )
-        .unwrap();
+        let bowl = extracted(&half, &ExtractOptions { method, border: Border::Open, ..ExtractOptions::default() });
         let report = bowl.report();
         assert!(report.boundary_edges > 30 && report.is_manifold() && report.is_oriented(), "{method:?}");
         assert_eq!((report.components, report.isolated_points), (1, 0));
@@ -154,14 +147,8 @@ fn invalid_cells_are_left_out() {
     }
     let ball: fn(DVec3) -> f64 = |p| 7.2 - (p - DVec3::new(9.6, 9.7, 9.8)).length();
     for method in METHODS {
-        let mut mesh = Mesh::default();
-        extract(
-            &Holed(LevelSet::new([20; 3], ball)),
-            &ExtractOptions { method, ..ExtractOptions::default() },
-            &mut mesh,
-            &Silent,
-        )
-        .unwrap();
+        let holed = Holed(LevelSet::new([20; 3], ball));
+        let mesh = extracted(&holed, &ExtractOptions { method, ..ExtractOptions::default() });
         let report = mesh.report();
         assert!(report.is_manifold() && report.is_oriented() && report.boundary_edges > 10, "{method:?}");
         assert!(report.components == 1 && report.boundary_loops == 1, "{method:?}");
@@ -198,9 +185,8 @@ fn bad_settings_are_refused() {
     for size in [[0, 5, 5], [1, 1, 1], [1, 7, 2]] {
         let values = vec![1u16; size.iter().product()];
         for (method, border) in METHODS.into_iter().flat_map(|m| [(m, Border::Closed), (m, Border::Open)]) {
-            let mut mesh = Mesh::default();
             let options = ExtractOptions { method, border, level: Level::above(0.5), ..good };
-            extract(&Dense::new(&values, size).unwrap(), &options, &mut mesh, &Silent).unwrap();
+            let mesh = extracted(&Dense::new(&values, size).unwrap(), &options);
             assert_eq!(mesh.validate(), Ok(()));
             assert_eq!(mesh.faces.is_empty(), border == Border::Open || values.is_empty(), "{size:?} {method:?}");
         }

@@ -58,8 +58,7 @@ fn tunnels_lead_through_cells() {
         let holes = [[3, 3, 3], [3 + step[0], 3 + step[1], 3 + step[2]]];
         let block = Samples::new([7; 3], |at| if holes.contains(&at.map(|c| c as i32)) { -1.0 } else { 1.0 });
         for method in METHODS.into_iter().filter(|&method| method != Method::Trilinear) {
-            let mut mesh = Mesh::default();
-            extract(&block, &ExtractOptions { method, ..ExtractOptions::default() }, &mut mesh, &Silent).unwrap();
+            let mesh = extracted(&block, &ExtractOptions { method, ..ExtractOptions::default() });
             assert_eq!(topology(&mesh), [2, 2], "{method:?} {step:?}");
         }
     }
@@ -99,11 +98,7 @@ fn trilinear_topology_is_that_of_a_refined_lattice() {
         let of =
             |method| topology(&surface(&values, [side; 3], &ExtractOptions { method, ..ExtractOptions::default() }));
         let found = of(Method::Trilinear);
-        let on_lattice = |times| {
-            let mut mesh = Mesh::default();
-            extract(&refined(&values, side, times), &ExtractOptions::default(), &mut mesh, &Silent).unwrap();
-            topology(&mesh)
-        };
+        let on_lattice = |times| topology(&extracted(&refined(&values, side, times), &ExtractOptions::default()));
         // Necks thinner than a step are not seen.
         let is_clear = on_lattice(7) == found || on_lattice(19) == found;
         unclear += usize::from(!is_clear);
