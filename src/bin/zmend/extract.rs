@@ -45,7 +45,17 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
             let given = args.cell.map(|_| "cell");
             let work = Work { options, given, cell: args.cell, max_memory: args.max_memory, write, tell: &args.tell };
             let volume = Some(&args.volume);
-            solid::run(&Job { input, goal: out, to, work, topology, volume, skeleton: None, patches: None })?;
+            solid::run(&Job {
+                input,
+                goal: out,
+                to,
+                work,
+                topology,
+                sketch: None,
+                volume,
+                skeleton: None,
+                patches: None,
+            })?;
         }
     }
     Ok(ExitCode::SUCCESS)
