@@ -140,12 +140,6 @@ impl<T: Sample> Volume for Dense<'_, T> {
         level.between(self.values[from].into(), self.values[to].into())
     }
 
-    fn crossings(&self, edges: &[([usize; 3], Axis)], level: Level, places: &mut [f64]) {
-        for (place, &(at, axis)) in places.iter_mut().zip(edges) {
-            *place = self.crossing(at, axis, level);
-        }
-    }
-
     fn signs(&self, [y, z]: [usize; 2], level: Level, words: &mut [u64]) {
         let start = self.index([0, y, z]);
         let (bound, all) = T::bound(level);

@@ -14,7 +14,6 @@
 
 use super::{Dense, Level, Placement, Sample, Volume};
 use crate::error::{Error, Result};
-use crate::grid::Axis;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -256,10 +255,6 @@ impl Volume for Image {
     #[inline]
     fn value(&self, at: [usize; 3]) -> f64 {
         self.voxels.value(self.index(at))
-    }
-
-    fn crossings(&self, edges: &[([usize; 3], Axis)], level: Level, places: &mut [f64]) {
-        with_samples!(&self.voxels, samples => dense(samples, self.size).crossings(edges, level, places));
     }
 
     fn signs(&self, row: [usize; 2], level: Level, words: &mut [u64]) {

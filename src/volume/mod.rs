@@ -135,12 +135,6 @@ pub trait Volume: Sync {
         level.between(self.value(at), self.value(to))
     }
 
-    /// Where the surface cuts many edges, each given by its lattice point and axis: the [`crossing`](Self::crossing) of each, to `places`, of which
-    /// there are as many. Arrays look up many samples at once; else `crossing` is called for each, if nothing else is said.
-    fn crossings(&self, edges: &[([usize; 3], Axis)], level: Level, places: &mut [f64]) {
-        places.iter_mut().zip(edges).for_each(|(place, &(at, axis))| *place = self.crossing(at, axis, level));
-    }
-
     /// The direction in which the field grows, at a place between the lattice points (`0 ..= size - 1` along each axis): the derivatives by
     /// x, y and z, in units of the value a step. Need not have the right length. Central differences, interpolated between
     /// the lattice points round the place, if nothing else is said; differences to one side at the border, and none where samples
@@ -186,9 +180,6 @@ impl<V: Volume + ?Sized> Volume for &V {
     }
     fn crossing(&self, at: [usize; 3], axis: Axis, level: Level) -> f64 {
         (**self).crossing(at, axis, level)
-    }
-    fn crossings(&self, edges: &[([usize; 3], Axis)], level: Level, places: &mut [f64]) {
-        (**self).crossings(edges, level, places);
     }
     fn gradient(&self, place: DVec3) -> DVec3 {
         (**self).gradient(place)

@@ -6,9 +6,9 @@ use super::lattice::{Lattice, place};
 use super::run::Extractor;
 use super::slice::Slice;
 use super::window::Window;
-use crate::grid::Edge;
 use crate::grid::brick::Bits;
 use crate::grid::cases::{CASES, Mask};
+use crate::grid::{Axis, Edge};
 use crate::volume::Volume;
 use glam::DVec3;
 
@@ -96,6 +96,16 @@ impl<V: Volume> Extractor for Cubes<'_, V> {
 /// Appends the points on the crossed edges of a slice, in order, in model units.
 #[inline]
 pub(super) fn edge_points<V: Volume>(lattice: &Lattice<'_, V>, slice: &Slice, z: usize, points: &mut Vec<DVec3>) {
-    let steps = lattice.steps();
-    lattice.crossings_of(slice, z, |at, axis, t| points.push(lattice.to_model(place(at)) + steps[axis.index()] * t));
+    for y in 0..slice.rows() {
+        for word in slice.row(y) {
+            let first = [64 * word.x as usize, y, z];
+            let start = lattice.to_model(place(first));
+            for (axis, along) in Axis::ALL.into_iter().zip(lattice.steps()) {
+                for x in Bits(word.crossed[axis.index()]) {
+                    let t = lattice.crossing([first[0] + x as usize, y, z], axis);
+                    points.push(start + lattice.steps()[0] * f64::from(x) + along * t);
+                }
+            }
+        }
+    }
 }

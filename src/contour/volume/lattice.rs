@@ -1,7 +1,5 @@
 //! A volume as extractors see it: with a layer of outside round it where the surface shall be closed, and a place in the model.
 
-use super::slice::Slice;
-use crate::grid::brick::Bits;
 use crate::grid::{Axis, Corner, Edge};
 use crate::volume::{Level, Placement, Volume};
 use glam::{DMat3, DVec3};
@@ -9,9 +7,6 @@ use glam::{DMat3, DVec3};
 /// Points keep this distance from the ends of their edge, in edges. So no two points meet, whatever the samples: three points on different
 /// edges of a cell are never on a line, and triangles between them have an area.
 pub(crate) const CLEARANCE: f64 = 1.0 / 1024.0;
-
-/// Crossings that are looked up at a time: enough to keep the memory busy, few enough for the first cache.
-const BATCH: usize = 256;
 
 /// A volume with its level and place. Lattice points count from the border on, if there is one: the first sample is then `[1, 1, 1]`.
 pub(crate) struct Lattice<'a, V: ?Sized> {
@@ -55,50 +50,11 @@ impl<'a, V: Volume> Lattice<'a, V> {
         let mut to = at;
         to[axis.index()] += 1;
         match (self.sample(at), self.sample(to)) {
-            (Some(at), Some(_)) => away_from_ends(self.volume.crossing(at, axis, self.level)),
-            _ => 0.5,
-        }
-    }
-
-    /// Calls `each` with the crossed edges of slice `z`, in order, and where the surface cuts them.
-    ///
-    /// Samples are looked up long after the signs were taken, when no cache has them any more. So edges are listed first, without a look at what
-    /// is there, and looked up many at a time: then nothing has to wait for one sample before it can ask for the next.
-    #[inline]
-    pub(crate) fn crossings_of(&self, slice: &Slice, z: usize, mut each: impl FnMut([usize; 3], Axis, f64)) {
-        let (mut edges, mut places) = (Vec::with_capacity(BATCH + 3 * 64), Vec::with_capacity(BATCH + 3 * 64));
-        let mut look_up = |edges: &mut Vec<([usize; 3], Axis)>| {
-            self.crossings(edges, &mut places);
-            edges.drain(..).zip(&places).for_each(|((at, axis), &t)| each(at, axis, t));
-        };
-        for y in 0..slice.rows() {
-            for word in slice.row(y) {
-                for axis in Axis::ALL {
-                    let at = |x: u32| [64 * word.x as usize + x as usize, y, z];
-                    edges.extend(Bits(word.crossed[axis.index()]).map(|x| (at(x), axis)));
-                }
-                if edges.len() >= BATCH {
-                    look_up(&mut edges);
-                }
+            (Some(at), Some(_)) => {
+                let t = self.volume.crossing(at, axis, self.level);
+                if t > CLEARANCE { t.min(1.0 - CLEARANCE) } else { CLEARANCE }
             }
-        }
-        look_up(&mut edges);
-    }
-
-    /// The crossings of many edges.
-    fn crossings(&self, edges: &mut [([usize; 3], Axis)], places: &mut Vec<f64>) {
-        places.clear();
-        places.resize(edges.len(), 0.5);
-        let (size, border) = (self.volume.size(), self.border);
-        // Those of which both ends are samples, along whatever axis.
-        let is_inner = |at: [usize; 3]| (0..3).all(|a| at[a].wrapping_sub(border) < size[a] - 1);
-        if edges.iter().all(|&(at, _)| is_inner(at)) {
-            edges.iter_mut().for_each(|(at, _)| *at = at.map(|c| c - border));
-            self.volume.crossings(edges, self.level, places);
-            edges.iter_mut().for_each(|(at, _)| *at = at.map(|c| c + border));
-            places.iter_mut().for_each(|t| *t = away_from_ends(*t));
-        } else {
-            places.iter_mut().zip(edges).for_each(|(place, &mut (at, axis))| *place = self.crossing(at, axis));
+            _ => 0.5,
         }
     }
 
@@ -162,12 +118,6 @@ impl<'a, V: Volume> Lattice<'a, V> {
     pub(crate) fn is_mirrored(&self) -> bool {
         self.placement.is_mirrored()
     }
-}
-
-/// A place on an edge, drawn away from its ends; from its start, if it is not a number.
-#[inline]
-fn away_from_ends(t: f64) -> f64 {
-    if t > CLEARANCE { t.min(1.0 - CLEARANCE) } else { CLEARANCE }
 }
 
 /// The place of a lattice point.

@@ -3,6 +3,7 @@
 use super::lattice::{Lattice, place};
 use super::slice::Slice;
 use crate::geom::qef::Qef;
+use crate::grid::brick::Bits;
 use crate::grid::{Axis, Edge};
 use crate::volume::Volume;
 use glam::{DVec3, Mat3A, Vec3A};
@@ -59,10 +60,18 @@ fn tangents_of<V: Volume>(
     with_normals: bool,
     tangents: &mut Vec<Tangent>,
 ) {
-    lattice.crossings_of(slice, z, |at, axis, t| {
-        let normal = if with_normals { lattice.normal(at, axis, t).as_vec3().to_array() } else { [0.0; 3] };
-        tangents.push(Tangent { t: t as f32, normal });
-    });
+    for y in 0..slice.rows() {
+        for word in slice.row(y) {
+            for axis in Axis::ALL {
+                for x in Bits(word.crossed[axis.index()]) {
+                    let at = [64 * word.x as usize + x as usize, y, z];
+                    let t = lattice.crossing(at, axis);
+                    let normal = if with_normals { lattice.normal(at, axis, t).as_vec3().to_array() } else { [0.0; 3] };
+                    tangents.push(Tangent { t: t as f32, normal });
+                }
+            }
+        }
+    }
 }
 
 impl<V: Volume> Lattice<'_, V> {
