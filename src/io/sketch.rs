@@ -70,11 +70,7 @@ pub fn read_bytes(name: &str, bytes: &[u8]) -> Result<Polylines> {
                 }
                 sketch.lines.push((line, COLOUR));
             }
-            [b'o', ref rest @ ..] => {
-                if is_end_of_line(rest) {
-                    break;
-                }
-            }
+            [b'o', ref rest @ ..] if is_end_of_line(rest) => break,
             _ => {}
         }
         text.skip_line();

@@ -48,7 +48,7 @@ pub fn conform(
     let unedited = EditedOctree::unedited(signed);
     let mut report = TopologyReport { before: Betti::of(&unedited), ..TopologyReport::default() };
     let points = kept.iter().filter(|key| key.dir().dimension() == 0).map(|&point| lattice_point(depth, point));
-    let (signed, dropped, left) = drop_untouched(unedited.into_signed(), points);
+    let (signed, dropped, left) = drop_untouched(unedited.signed(), points);
     if left == 0 {
         let remedy = "draw it in the coordinates of the model, where the solid is";
         return Err(Error::setting("sketch", "no line of it comes into the solid", remedy));

@@ -144,11 +144,7 @@ fn path([from, to]: [Point; 2]) -> Vec<Point> {
         };
         let axis = (0..3).filter(|&a| steps[a] < far[a]).min_by(comes_first).expect("the end is not reached");
         steps[axis] += 1;
-        if to[axis] > from[axis] {
-            at[axis] += 1
-        } else {
-            at[axis] -= 1
-        }
+        at[axis] = if to[axis] > from[axis] { at[axis] + 1 } else { at[axis] - 1 };
         path.push(at);
     }
     path

@@ -27,8 +27,11 @@ pub fn move_small(signed: SignedOctree, side: Side, volume: f64) -> (SignedOctre
 
 /// Drops all solids of which none of some lattice points, in cells, is a part. Returns the octree, the number of solids dropped, and of those that
 /// are left.
-pub(super) fn drop_untouched(signed: SignedOctree, points: impl Iterator<Item = [u32; 3]>) -> (SignedOctree, u64, u64) {
-    let components = Components::new(&signed);
+pub(super) fn drop_untouched(
+    signed: &SignedOctree,
+    points: impl Iterator<Item = [u32; 3]>,
+) -> (SignedOctree, u64, u64) {
+    let components = Components::new(signed);
     let mut touched = vec![false; components.list().len()];
     points.for_each(|at| touched[components.of_point(at) as usize] = true);
     let left = components.list().iter().zip(&touched).filter(|(component, touched)| component.is_inside && **touched);
