@@ -160,7 +160,7 @@ pub(crate) fn volume(bytes: &[u8]) {
             if file.image.voxels().len() <= 4096 {
                 let range = file.image.voxels().range();
                 let options = ExtractOptions {
-                    level: Level::above(0.5 * (range.min + range.max)),
+                    level: Level::above(0.5 * (range.least + range.greatest)),
                     method: Method::SurfaceNets,
                     ..ExtractOptions::default()
                 };
