@@ -52,7 +52,12 @@ pub(crate) fn extracted(bytes: &[u8]) {
         let corners = mesh.faces.corners().len() as i64;
         eulers.push((method, mesh.points.len() as i64 - corners / 2 + mesh.faces.len() as i64));
         if matches!(method, Method::MarchingCubes | Method::ExtendedMarchingCubes) {
-            assert_eq!(eulers[0].1, eulers.last().expect("just pushed").1, "{method:?} has the topology of {:?}", METHODS[0]);
+            assert_eq!(
+                eulers[0].1,
+                eulers.last().expect("just pushed").1,
+                "{method:?} has the topology of {:?}",
+                METHODS[0]
+            );
         }
     }
 }

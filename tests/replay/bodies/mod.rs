@@ -5,8 +5,8 @@
 
 mod draw;
 mod edits;
-mod files;
 mod fields;
+mod files;
 mod octrees;
 mod signs;
 mod soups;

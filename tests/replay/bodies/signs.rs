@@ -3,10 +3,10 @@
 use super::Draw;
 use zmend::geom::Frame;
 use zmend::glam::DVec3;
-use zmend::grid::brick::{Local, Plane};
 use zmend::grid::Key;
-use zmend::octree::crossings::{Sample, lattice_point};
+use zmend::grid::brick::{Local, Plane};
 use zmend::octree::SignedOctree;
+use zmend::octree::crossings::{Sample, lattice_point};
 use zmend::progress::Silent;
 use zmend::topology::{Betti, Options as Repair};
 use zmend::{Mesh, Options, Solid, Surface};

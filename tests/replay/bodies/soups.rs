@@ -6,9 +6,8 @@ use zmend::repair::{Keep, Offset, Thicken, Warning};
 use zmend::{Error, Faces, Inside, Mesh, Options, Surface, repair, topology};
 
 /// Values on planes of the grid, beside them by next to nothing, anywhere, and nowhere.
-const VALUES: [f64; 16] = [
-    2.0, 3.0, 4.0, 8.0, 8.000_000_001, 9.0, 11.0, 12.0, 14.0, 2.5, 7.000_3, 10.123_456_789, 5.0, 6.0, f64::NAN, 1e300,
-];
+const VALUES: [f64; 16] =
+    [2.0, 3.0, 4.0, 8.0, 8.000_000_001, 9.0, 11.0, 12.0, 14.0, 2.5, 7.000_3, 10.123_456_789, 5.0, 6.0, f64::NAN, 1e300];
 
 pub(crate) fn repaired(bytes: &[u8]) {
     let mut draw = Draw::new(bytes);
@@ -57,7 +56,9 @@ fn options(draw: &mut Draw<'_>) -> Options {
         7 => options.keep = Keep::Ratio(draw.share()),
         8 => options.topology = topology::Options { cut: Some(width), ..topology::Options::default() },
         9 => options.topology = topology::Options { fill: Some(width), ..topology::Options::default() },
-        10 => options.topology = topology::Options { genus: Some(draw.below(3) as u64), ..topology::Options::default() },
+        10 => {
+            options.topology = topology::Options { genus: Some(draw.below(3) as u64), ..topology::Options::default() }
+        }
         11 => options.scale = draw.share(),
         _ => {}
     }

@@ -1,14 +1,11 @@
 //! Solids damaged by chance, repaired in every way: not one violation in as many as are asked for.
 //!
-//! The long run: `ZMEND_DAMAGED=100000 cargo test --release --test damaged -- --nocapture`. `ZMEND_DAMAGED_FIRST` is the number of the first
+//! The long run: `ZMEND_DAMAGED=100000 cargo test --release --test promises damaged -- --nocapture`. `ZMEND_DAMAGED_FIRST` is the number of the first
 //! case, 0 if not given: a failure names its case, and that alone is run again by `ZMEND_DAMAGED=1 ZMEND_DAMAGED_FIRST=N`.
 
-#[path = "../common/mod.rs"]
-mod common;
-mod solids;
-
-use common::{check_warnings, topology_of, volume, with_points};
-use solids::{Case, case};
+use crate::common::{check_warnings, topology_of, volume, with_points};
+use crate::solids::{Case, case};
+use crate::{is_same, number, pool};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -33,14 +30,6 @@ struct Tally {
     faces: u64,
     slowest: (Duration, u64),
     failures: Vec<String>,
-}
-
-fn number(name: &str) -> Option<u64> {
-    std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is a number")))
-}
-
-fn pool(threads: usize) -> rayon::ThreadPool {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
 }
 
 #[test]
@@ -163,7 +152,8 @@ fn check_surface(options: &Options, repaired: &Repaired) -> Result<(), String> {
         return Err(format!("{:?} announced, but {} and {}", report.sizes, mesh.points.len(), mesh.faces.len()));
     }
     let whole = frame.size().powi(3);
-    if whole.is_normal() && (!(0.0..whole).contains(&report.volume) || mesh.faces.is_empty() != (report.volume == 0.0)) {
+    if whole.is_normal() && (!(0.0..whole).contains(&report.volume) || mesh.faces.is_empty() != (report.volume == 0.0))
+    {
         return Err(format!("a volume of {} in a cube of {whole}", report.volume));
     }
     Ok(())
@@ -189,12 +179,7 @@ fn is_of_the_grid(error: &Error) -> bool {
 fn same(one: &zmend::Result<Repaired>, two: &zmend::Result<Repaired>) -> Result<(), String> {
     match (one, two) {
         (Ok(one), Ok(two)) => {
-            let bits = |mesh: &Mesh| -> Vec<u64> {
-                mesh.points.iter().flat_map(|p| p.to_array().map(f64::to_bits)).collect()
-            };
-            let is_same = bits(&one.mesh) == bits(&two.mesh)
-                && one.mesh.faces == two.mesh.faces
-                && one.report.warnings == two.report.warnings;
+            let is_same = is_same(&one.mesh, &two.mesh) && one.report.warnings == two.report.warnings;
             if is_same { Ok(()) } else { Err("one thread and two make different meshes".to_owned()) }
         }
         (Err(one), Err(two)) if one.to_string() == two.to_string() => Ok(()),

@@ -65,11 +65,8 @@ pub(crate) fn case(number: u64) -> Case {
     let mut chance = Chance(number.wrapping_mul(0x2545_f491_4f6c_dd1d));
     let (name, mesh) = solid(&mut chance);
     let mut words = vec![name];
-    let mut soup = Soup {
-        size: extent(&mesh),
-        faces: mesh.faces.iter().map(<[u32]>::to_vec).collect(),
-        points: mesh.points,
-    };
+    let mut soup =
+        Soup { size: extent(&mesh), faces: mesh.faces.iter().map(<[u32]>::to_vec).collect(), points: mesh.points };
     for _ in 0..=chance.below(5) {
         let (name, harm) = HARMS[chance.below(HARMS.len())];
         let strength = chance.unit().powi(3);
@@ -94,9 +91,8 @@ fn extent(mesh: &Mesh) -> f64 {
 
 fn solid(chance: &mut Chance) -> (String, Mesh) {
     static SAMPLES: OnceLock<Vec<Mesh>> = OnceLock::new();
-    let samples = SAMPLES.get_or_init(|| {
-        sample::names().iter().map(|(name, _)| sample::build(name, 1).expect("a sample")).collect()
-    });
+    let samples = SAMPLES
+        .get_or_init(|| sample::names().iter().map(|(name, _)| sample::build(name, 1).expect("a sample")).collect());
     if chance.below(12) == 0 {
         let i = chance.below(samples.len());
         return (sample::names()[i].0.to_owned(), samples[i].clone());
@@ -181,7 +177,8 @@ fn drawn_options(number: u64, mesh: &Mesh, chance: &mut Chance, words: &mut Vec<
     options.drop_cavities = chance.below(6) == 0;
     let (area, volume) = (Some(size * size), Some(size * size * size));
     // What is too large or small to have a volume in model units has no topology to repair, either.
-    let choice = if (size * size * size).is_normal() && (cell * cell * cell).is_normal() { chance.below(16) } else { 16 };
+    let choice =
+        if (size * size * size).is_normal() && (cell * cell * cell).is_normal() { chance.below(16) } else { 16 };
     options.topology = match choice {
         0 => topology::Options { cut: area, ..topology::Options::default() },
         1 => topology::Options { fill: area, ..topology::Options::default() },
