@@ -38,6 +38,7 @@ pub use tree::{Closest, TriangleTree};
 pub use validate::Violation;
 
 use glam::DVec3;
+use std::collections::TryReserveError;
 use std::ops::Range;
 
 /// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
@@ -67,6 +68,12 @@ impl Polygons {
     pub fn reserve_exact(&mut self, polygons: usize, corners: usize) {
         self.ends.reserve_exact(polygons);
         self.corners.reserve_exact(corners);
+    }
+
+    /// As [`reserve_exact`](Self::reserve_exact), but says if there is not enough memory.
+    pub(crate) fn try_reserve_exact(&mut self, polygons: usize, corners: usize) -> Result<(), TryReserveError> {
+        self.ends.try_reserve_exact(polygons)?;
+        self.corners.try_reserve_exact(corners)
     }
 
     /// Appends a polygon.

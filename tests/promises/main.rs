@@ -7,6 +7,7 @@ mod common;
 mod cancel;
 mod damaged;
 mod solids;
+mod supply;
 mod together;
 
 /// A number from the environment.

@@ -58,7 +58,7 @@ fn check_error(error: &Error) {
 fn mesh(bytes: &[u8], hint: Format, is_streamed: bool) {
     let read = io::read_bytes(NAME, bytes, Some(hint));
     match &read {
-        Ok(mesh) => check_mesh(mesh, bytes.len()),
+        Ok(mesh) => check_mesh(mesh, hint, bytes.len()),
         Err(error) => check_error(error),
     }
     if is_streamed {
@@ -66,10 +66,11 @@ fn mesh(bytes: &[u8], hint: Format, is_streamed: bool) {
     }
 }
 
-fn check_mesh(mesh: &Mesh, len: usize) {
+fn check_mesh(mesh: &Mesh, hint: Format, len: usize) {
     assert!(mesh.faces.corners().iter().all(|&i| (i as usize) < mesh.points.len()), "indices lead somewhere");
-    // Scenes may use their parts several times, and archives are packed.
-    let most = 64 * len.pow(2) + 4096;
+    // Scenes may use their parts several times.
+    let is_scene = matches!(hint, Format::Gltf | Format::Glb | Format::ThreeMf);
+    let most = if is_scene { (3 << 20) + 48 * len } else { len };
     assert!(mesh.points.len() <= most && mesh.faces.corners().len() <= most, "no more than {len} bytes can say");
     if mesh.faces.len() <= MOST_FACES {
         let is_solid = mesh.validate().is_ok();
