@@ -6,6 +6,7 @@ mod common;
 
 mod cancel;
 mod damaged;
+mod oracles;
 mod solids;
 mod supply;
 mod together;
