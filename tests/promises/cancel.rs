@@ -219,3 +219,33 @@ fn what_is_stopped_at_once_does_not_begin() {
         assert!(matches!(job(&stop), Err(Error::Cancelled)), "{name}");
     }
 }
+
+/// Memory of this process that is in use, in bytes.
+#[cfg(target_os = "linux")]
+fn resident() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").expect("a process");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its size");
+    1024 * line.trim().trim_end_matches(" kB").parse::<u64>().expect("a number")
+}
+
+/// Repairs that are stopped half-way leave nothing: less than half of what they hold, for the other tests of this process hold something, too.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_stopped_gives_back_its_memory() {
+    let mesh = sample::build("part", 1).expect("a sample");
+    let options = Options { depth: 9, surface: Surface::DualContouring, inside: Inside::Parity, ..Options::default() };
+    let run = |after: Duration| {
+        let stop = Stop::after(after);
+        let result = crate::pool(2).install(|| repair_into(&mut &mesh, &options, &mut Mesh::default(), &stop));
+        (result, stop.begun.elapsed())
+    };
+    let (whole, took) = run(Duration::MAX);
+    let held = whole.expect("repairable").octree_bytes;
+    let stop_some = |n: u32| (0..n).filter(|i| run(took.mul_f64(f64::from(3 + i % 5) / 8.0)).0.is_err()).count();
+    stop_some(2);
+    let before = resident();
+    let stopped = stop_some(16) as u64;
+    let more = resident().saturating_sub(before);
+    println!("{stopped} of 16 repairs of {held} bytes stopped; {more} bytes more");
+    assert!(stopped >= 8 && more < held * stopped / 2, "{stopped} stopped, {more} bytes");
+}

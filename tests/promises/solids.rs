@@ -82,11 +82,12 @@ pub(crate) fn case(number: u64) -> Case {
     Case { mesh, options, words: words.join(", ") }
 }
 
-/// The longest side of the bounds of what is finite.
+/// The longest side of the bounds of what is finite; 1 if there is nothing, or all in one place.
 fn extent(mesh: &Mesh) -> f64 {
     let mut bounds = Bounds::EMPTY;
     mesh.faces.corners().iter().for_each(|&i| bounds.add(mesh.points[i as usize]));
-    if bounds.is_empty() { 1.0 } else { bounds.extent().max_element() }
+    let size = if bounds.is_empty() { 0.0 } else { bounds.extent().max_element() };
+    if size > 0.0 { size } else { 1.0 }
 }
 
 fn solid(chance: &mut Chance) -> (String, Mesh) {
