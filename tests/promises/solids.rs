@@ -151,22 +151,26 @@ fn drawn_options(number: u64, mesh: &Mesh, chance: &mut Chance, words: &mut Vec<
     if chance.below(8) == 0 {
         options.scale = 0.05 + 0.94 * chance.unit();
     }
-    // About a cell, as far as it is known before the options are.
-    let cell = extent(mesh) / (options.scale * f64::from(1u32 << depth));
-    let mut lengths = |from: f64, to: f64| cell * (from + (to - from) * chance.unit());
-    let (gap, wall, offset, size) = (lengths(1.0, 6.0), lengths(4.0, 8.0), lengths(2.0, 5.0), lengths(1.0, 10.0));
+    // The grid grows with widths: so many cells are a width of which both sides of the model get as much as it is.
+    let (extent, cells) = (extent(mesh), options.scale * f64::from(1u32 << depth));
+    let mut width = |from: f64, to: f64| {
+        let wanted = from + (to - from) * chance.unit();
+        (cells > 4.0 * wanted).then(|| wanted * extent / (cells - 2.0 * wanted))
+    };
+    let (gap, wall, offset) = (width(1.0, 6.0), width(2.1, 6.0), width(2.0, 5.0));
+    let (cell, size) = (extent / cells, (1.0 + 9.0 * chance.unit()) * extent / cells);
     if options.surface == Surface::Quads && chance.below(3) == 0 {
         options.faces = Faces::Triangles;
     }
     if inside == Inside::Hull && chance.below(2) == 0 {
-        options.gap = Some(gap);
+        options.gap = gap;
     }
     match chance.below(16) {
-        0 => options.thicken = Some(wall),
-        1 => (options.thicken, options.thicken_what) = (Some(wall), Thicken::All),
-        2 => options.offset = Some(Offset::Solid(offset)),
-        3 => options.offset = Some(Offset::Solid(-offset)),
-        4 => options.offset = Some(Offset::Shell(offset)),
+        0 => options.thicken = wall,
+        1 => (options.thicken, options.thicken_what) = (wall, Thicken::All),
+        2 => options.offset = offset.map(Offset::Solid),
+        3 => options.offset = offset.map(|offset| Offset::Solid(-offset)),
+        4 => options.offset = offset.map(Offset::Shell),
         _ => {}
     }
     options.keep = match chance.below(8) {
