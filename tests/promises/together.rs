@@ -14,7 +14,7 @@ use zmend::progress::{Progress, Silent};
 use zmend::{Mesh, Options, Result, Surface, repair, repair_into};
 
 /// Cases of damaged solids; every one of them is repaired on many threads at a time.
-const CASES: u64 = 40;
+const CASES: u64 = 16;
 
 /// Runs something that must not wait for itself.
 fn in_time<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
@@ -48,7 +48,7 @@ fn many_repairs_at_a_time_give_what_one_gives() {
         // and on threads of the caller's own, all into rayon's own pool.
         let in_own: Vec<_> = std::thread::scope(|scope| {
             let handles: Vec<_> = expected
-                .chunks(10)
+                .chunks(4)
                 .map(|some| scope.spawn(|| some.iter().map(|&n| repaired(n)).collect::<Vec<_>>()))
                 .collect();
             handles.into_iter().flat_map(|handle| handle.join().expect("no panic")).collect()

@@ -47,11 +47,14 @@ pub(crate) fn threemf(bytes: &[u8]) {
     }
 }
 
-/// Checks an error's words: they name the input, and no part of them is missing.
+/// Checks an error's words: they name the input, or a file beside it that it refers to, and no part of them is missing.
 fn check_error(error: &Error) {
     let message = error.to_string();
-    assert!(matches!(error, Error::Format { problem, .. } if !problem.is_empty()), "{message}");
-    assert!(message.starts_with(NAME), "{message}");
+    match error {
+        Error::Format { problem, .. } => assert!(!problem.is_empty() && message.starts_with(NAME), "{message}"),
+        Error::Io { action, .. } => assert_eq!(*action, "read", "{message}"),
+        _ => panic!("{message}"),
+    }
 }
 
 /// Reads a mesh, and streams it where that is something else.
