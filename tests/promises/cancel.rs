@@ -150,11 +150,11 @@ fn jobs(depth: u32) -> Vec<Job> {
             topology(topology::Options { genus: Some(0), ..topology::Options::default() }),
         ),
     ];
-    let soup = sample::build("gear", 2 * detail).expect("a sample");
-    let ball = sample::build("sphere", 4 * detail).expect("a sample");
-    let far = DistanceOptions { samples: 100_000 << (2 * (depth.max(8) - 8)), ..DistanceOptions::default() };
+    let soup = sample::build("gear", detail).expect("a sample");
+    let ball = sample::build("sphere", detail).expect("a sample");
+    let far = DistanceOptions { samples: 10_000 << (2 * (depth.max(7) - 7)), ..DistanceOptions::default() };
     jobs.push(("distances", Box::new(move |progress| ball.distances(&soup, far, progress).map(|_| ()))));
-    let side = 1usize << depth.min(9);
+    let side = 1usize << (depth - 1).min(9);
     let gyroid = move |p: DVec3| {
         let q = p * (40.0 / side as f64);
         q.x.sin() * q.y.cos() + q.y.sin() * q.z.cos() + q.z.sin() * q.x.cos()

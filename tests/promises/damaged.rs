@@ -14,7 +14,7 @@ use zmend::mesh::Bounds;
 use zmend::{Error, Mesh, Options, Repaired, Surface, repair};
 
 /// Cases of a run in CI.
-const CASES: u64 = 1200;
+const CASES: u64 = 160;
 /// One in so many cases is repaired on one thread and on two: a prime, so that all that takes turns meets it.
 const THREADS_SHARE: u64 = 23;
 /// No case may take longer: a thousand times what most take.

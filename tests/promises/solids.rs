@@ -145,7 +145,7 @@ fn drawn_options(number: u64, mesh: &Mesh, chance: &mut Chance, words: &mut Vec<
     let depth = DEPTHS[turn(1, DEPTHS.len())];
     let inside = [Inside::Auto, Inside::Parity, Inside::Winding, Inside::Hull][turn(20, 4)];
     let modes = surfaces(depth);
-    let (mode, options) = modes[turn(80, modes.len())];
+    let (mode, options) = modes[turn(1, modes.len())];
     let mut options = Options { inside, ..options };
     words.push(format!("{mode} by {inside:?} at depth {depth}"));
     if chance.below(8) == 0 {
