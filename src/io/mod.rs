@@ -18,7 +18,7 @@
 //! Scenes of parts (glTF, 3MF) become one mesh, with the transforms of their nodes, items and components applied.
 //!
 //! Signed octrees in SOF, SOG and DCF files ([`OctreeFormat`]) come and go by [`read_octree`], [`write_sof`], [`write_sog`] and
-//! [`write_dcf`]. Volumes have a [module](volume) of their own.
+//! [`write_dcf`]. Volumes have a [module](volume) of their own, and so have [sketches](sketch).
 //!
 //! ```
 //! use zmend::io;
@@ -45,6 +45,7 @@ mod ply;
 #[cfg(any(feature = "gltf", feature = "3mf"))]
 mod scene;
 pub mod skeleton;
+pub mod sketch;
 pub mod skt;
 mod stl;
 mod text;
