@@ -252,9 +252,9 @@ fn what_cannot_be_read_or_written_is_told() {
         use std::os::unix::fs::PermissionsExt;
         let path = folder.path().join(name);
         if name == "locked" {
-            fs::create_dir(&path).unwrap()
+            fs::create_dir(&path).unwrap();
         } else {
-            drop(File::create(&path).unwrap())
+            drop(File::create(&path).unwrap());
         }
         fs::set_permissions(&path, fs::Permissions::from_mode(bits)).unwrap();
     }

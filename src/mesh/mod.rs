@@ -106,8 +106,12 @@ impl Polygons {
 
     /// As [`reserve_exact`](Self::reserve_exact), but says if there is not enough memory.
     pub(crate) fn try_reserve_exact(&mut self, polygons: usize, corners: usize) -> Result<(), TryReserveError> {
-        self.ends.try_reserve_exact(polygons)?;
-        self.corners.try_reserve_exact(corners)
+        self.corners.try_reserve_exact(corners)?;
+        if let Ends::Each(ends) = &mut self.ends {
+            ends.try_reserve_exact(polygons)?;
+        }
+        self.reserve_exact(polygons, corners);
+        Ok(())
     }
 
     /// Appends a polygon.

@@ -12,6 +12,9 @@ use crate::octree::crossings::lattice_point;
 use crate::progress::{Progress, check};
 use rayon::prelude::*;
 
+/// Points of a brick by their index, and shorter ways for them.
+type Found = Vec<(u16, [i16; 3])>;
+
 /// A position in 512ths of a cell.
 type Place = [i32; 3];
 
@@ -22,7 +25,7 @@ impl Band {
     /// `Cancelled`.
     pub(super) fn refine(&mut self, from: f64, progress: &dyn Progress) -> Result<()> {
         let least = (from.max(NEAR) * f64::from(UNIT)).powi(2) as u32;
-        let found: Result<Vec<Vec<(u16, [i16; 3])>>> = (0..self.bricks.len())
+        let found: Result<Vec<Found>> = (0..self.bricks.len())
             .into_par_iter()
             .map(|n| {
                 check(progress)?;
