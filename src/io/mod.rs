@@ -60,7 +60,7 @@ pub use input::{Input, InputInfo, open};
 pub use octree::{
     OctreeFile, OctreeFormat, OctreeInfo, read_octree, read_octree_bytes, write_dcf, write_sof, write_sog,
 };
-pub use write::{WriteOptions, Writer, create, write};
+pub use write::{WriteOptions, Writer, create, write, write_as};
 
 use crate::error::{Error, Place, Result};
 use crate::mesh::Mesh;

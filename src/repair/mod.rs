@@ -2,6 +2,7 @@
 
 mod hull;
 mod inside;
+mod keep_good;
 mod memory;
 mod options;
 mod refined;
@@ -12,6 +13,7 @@ mod trace;
 
 pub use crate::sign::{Keep, Kept, Offset, Thicken};
 pub use inside::{InsideChoice, Reason};
+pub use keep_good::{KeptParts, Mended, repair_keeping_good};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
 pub use solid::Solid;
