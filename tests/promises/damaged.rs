@@ -10,13 +10,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-use zmend::mesh::Bounds;
-use zmend::{Error, Mesh, Options, Repaired, Surface, repair};
+use zmend::mesh::{Bounds, HealOptions};
+use zmend::progress::Silent;
+use zmend::{Error, Mesh, Options, Repaired, Surface, repair, repair_keeping_good};
 
 /// Cases of a run in CI.
 const CASES: u64 = 160;
 /// One in so many cases is repaired on one thread and on two: a prime, so that all that takes turns meets it.
 const THREADS_SHARE: u64 = 23;
+/// One in so many is also repaired so that its good parts stay.
+const KEEPING_SHARE: u64 = 11;
 /// No case may take longer: a thousand times what most take.
 const MOST_SECONDS: u64 = 60;
 
@@ -83,6 +86,9 @@ fn run(number: u64, one: &rayon::ThreadPool, two: &rayon::ThreadPool, tally: &Mu
         if number.is_multiple_of(THREADS_SHARE) {
             same(&repaired, &two.install(|| repair(mesh.clone(), &options)))?;
         }
+        if number.is_multiple_of(KEEPING_SHARE) {
+            one.install(|| check_keeping(&mesh, &options))?;
+        }
         verdict(&mesh, &options, repaired)
     }));
     let took = begun.elapsed();
@@ -127,6 +133,21 @@ fn verdict(mesh: &Mesh, options: &Options, repaired: zmend::Result<Repaired>) ->
         }
     }
     Ok(Some(repaired.mesh.faces.len() as u64))
+}
+
+/// Checks a repair that keeps what is good, of which some options make no sense.
+fn check_keeping(mesh: &Mesh, options: &Options) -> Result<(), String> {
+    let Options { depth, inside, surface, faces, no_self_intersections, .. } = *options;
+    let options = Options { depth, inside, surface, faces, no_self_intersections, ..Options::default() };
+    let mended = match repair_keeping_good(mesh, &options, &HealOptions::default(), &Silent) {
+        Ok(mended) => mended,
+        Err(error) if is_extreme(mesh, &options) && is_of_the_grid(&error) => return Ok(()),
+        Err(error) => return Err(format!("keeping what is good: refused: {error}")),
+    };
+    let told = mended.mesh.validate().map_err(|violation| format!("keeping what is good: {violation}"));
+    told.and_then(|()| {
+        topology_of(&mended.mesh).map(|_| ()).map_err(|problem| format!("keeping what is good: {problem}"))
+    })
 }
 
 /// Checks the surface and what the report says of it. Volumes are counted in cells: those of huge and tiny models are no numbers.

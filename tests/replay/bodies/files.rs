@@ -143,6 +143,18 @@ pub(crate) fn skt(bytes: &[u8]) {
     }
 }
 
+pub(crate) fn axs(bytes: &[u8]) {
+    match io::sketch::read_bytes(NAME, bytes) {
+        Err(error) => check_error(&error),
+        Ok(lines) => {
+            assert!(lines.points.iter().all(|p| p.is_finite()));
+            let mut ends = lines.lines.iter().flat_map(|line| &line.0);
+            assert!(ends.all(|&i| (i as usize) < lines.points.len()), "lines lead somewhere");
+            assert!(lines.points.len() <= bytes.len() && lines.lines.len() <= bytes.len());
+        }
+    }
+}
+
 /// The first byte says how much is known of the rest: nothing, or a layout of raw samples.
 pub(crate) fn volume(bytes: &[u8]) {
     let Some((&first, rest)) = bytes.split_first() else { return };

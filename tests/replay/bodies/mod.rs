@@ -17,7 +17,7 @@ use draw::Draw;
 pub(crate) type Target = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub(crate) const TARGETS: [Target; 18] = [
+pub(crate) const TARGETS: [Target; 19] = [
     ("stl", files::stl),
     ("ply", files::ply),
     ("obj", files::obj),
@@ -29,6 +29,7 @@ pub(crate) const TARGETS: [Target; 18] = [
     ("sog", files::sog),
     ("dcf", files::dcf),
     ("skt", files::skt),
+    ("axs", files::axs),
     ("volume", files::volume),
     ("octree_bytes", octrees::bytes),
     ("octrees", octrees::operations),
