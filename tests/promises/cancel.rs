@@ -108,7 +108,7 @@ fn jobs(depth: u32) -> Vec<Job> {
         repairing("winding", "knot-holes", detail, Options { inside: Inside::Winding, ..coarse }),
         repairing("winding of overlaps", "overlap", detail, by(Inside::Winding)),
         repairing("hull", "gear", detail, by(Inside::Hull)),
-        repairing("hull with gap", "gear", detail, Options { gap: Some(width), ..by(Inside::Hull) }),
+        repairing("hull with gap", "gear", detail, Options { gap: Some(width), inside: Inside::Hull, ..coarse }),
         repairing("dual contouring", "part", detail, Options { surface: Surface::DualContouring, ..plain }),
         repairing(
             "dual contouring, disjoint",
@@ -121,10 +121,10 @@ fn jobs(depth: u32) -> Vec<Job> {
             "walls",
             "scan",
             detail,
-            Options { thicken: Some(width), thicken_what: Thicken::All, ..by(Inside::Parity) },
+            Options { thicken: Some(width), thicken_what: Thicken::All, inside: Inside::Parity, ..coarse },
         ),
-        repairing("offset", "torus", detail, Options { offset: Some(Offset::Solid(width)), ..plain }),
-        repairing("shell", "torus", detail, Options { offset: Some(Offset::Shell(width)), ..plain }),
+        repairing("offset", "torus", detail, Options { offset: Some(Offset::Solid(width)), ..coarse }),
+        repairing("shell", "torus", detail, Options { offset: Some(Offset::Shell(width)), ..coarse }),
         repairing(
             "keep",
             "overlap",
@@ -154,7 +154,7 @@ fn jobs(depth: u32) -> Vec<Job> {
     let ball = sample::build("sphere", detail).expect("a sample");
     let far = DistanceOptions { samples: 10_000 << (2 * (depth.max(7) - 7)), ..DistanceOptions::default() };
     jobs.push(("distances", Box::new(move |progress| ball.distances(&soup, far, progress).map(|_| ()))));
-    let side = 1usize << (depth - 1).min(9);
+    let side = 1usize << (depth - 2).min(9);
     let gyroid = move |p: DVec3| {
         let q = p * (40.0 / side as f64);
         q.x.sin() * q.y.cos() + q.y.sin() * q.z.cos() + q.z.sin() * q.x.cos()
