@@ -1,4 +1,4 @@
-//! Memory within limits, and signals: what only a whole process can show.
+//! Memory within limits, signals, and faults of the system: what only a whole process can show.
 #![cfg(target_os = "linux")]
 
 use serde_json::Value;
@@ -6,10 +6,13 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use zmend::io::{self, WriteOptions};
-use zmend::mesh::sample;
+use zmend::mesh::{TriangleSource, sample};
+use zmend::progress::Progress;
+use zmend::{Inside, Mesh, Options, repair_into};
 
 fn program() -> PathBuf {
     assert_cmd::cargo::cargo_bin("zmend")
@@ -138,6 +141,241 @@ fn signals_end_a_repair_and_leave_nothing() {
 fn a_second_signal_ends_it_at_once() {
     let (output, _) = interrupt(&["-INT", "-INT"]);
     assert_eq!(output.status.code(), Some(130), "{}", error(&output));
+}
+
+/// Memory of this process that is in use, in bytes.
+fn resident() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    1024 * line.trim().trim_end_matches(" kB").parse::<u64>().unwrap()
+}
+
+/// Stops after so many looks.
+struct StopAfter(AtomicI64);
+
+impl Progress for StopAfter {
+    fn is_cancelled(&self) -> bool {
+        self.0.fetch_sub(1, Ordering::Relaxed) <= 0
+    }
+}
+
+#[test]
+fn what_is_stopped_gives_back_its_memory() {
+    let cube = sample::build("cube", 1).unwrap();
+    let options = Options { depth: 9, inside: Inside::Parity, ..Options::default() };
+    let run = |looks: i64| {
+        let stop = StopAfter(AtomicI64::new(looks));
+        let result = repair_into(&mut &cube, &options, &mut Mesh::default(), &stop);
+        result.map(|report| (report.octree_bytes, looks - stop.0.into_inner()))
+    };
+    let (held, looks) = run(i64::MAX).unwrap();
+    let stop_some = |n: i64| (0..n).for_each(|i| assert!(run(looks * (2 + i % 3) / 5).is_err()));
+    stop_some(3);
+    let before = resident();
+    stop_some(12);
+    let more = resident().saturating_sub(before);
+    println!("12 repairs of {held} bytes stopped within {looks} looks; {more} bytes more");
+    assert!(more < 4 * held, "{more} bytes for {held}");
+}
+
+/// In whatever stage the signal comes, there is a whole file and a code of 0, or no file and a code of 130.
+#[test]
+fn signals_at_any_moment_leave_all_or_nothing() {
+    let folder = folder(&[("knot-holes", 1)]);
+    let (mut whole, mut ended) = (0, 0);
+    for delay in [0, 10, 30, 60, 120, 240, 480, 960] {
+        let mut command = Command::new(program());
+        command.current_dir(folder.path()).args("repair knot-holes.ply out.ply -d 9 --inside winding -q".split(' '));
+        let child = command.stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(delay));
+        // It may have ended already.
+        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status().unwrap();
+        let output = child.wait_with_output().unwrap();
+        match output.status.code() {
+            Some(0) => {
+                assert_eq!(names(folder.path()), ["knot-holes.ply", "out.ply"]);
+                assert!(io::read(folder.path().join("out.ply")).unwrap().faces.len() > 10_000);
+                fs::remove_file(folder.path().join("out.ply")).unwrap();
+                whole += 1;
+            }
+            // Before it listens, the signal ends it as it ends any program.
+            code => {
+                assert!(code == Some(130) || (code.is_none() && delay < 60), "{code:?} after {delay} ms");
+                assert_eq!(names(folder.path()), ["knot-holes.ply"]);
+                ended += 1;
+            }
+        }
+    }
+    println!("{whole} whole, {ended} ended");
+    assert!(ended > 0);
+}
+
+/// A disk that is full: a file that may not grow, and a device without any room.
+#[test]
+fn a_full_disk_leaves_what_was_there() {
+    let folder = folder(&[("knot-holes", 1)]);
+    for name in ["out.ply", "out.stl", "out.obj", "out.off", "out.glb", "out.3mf", "out.sog", "out.dcf"] {
+        fs::write(folder.path().join(name), "mine").unwrap();
+        let args = format!("repair knot-holes.ply {name} -d 6 -q --force");
+        let script = format!("trap '' XFSZ; ulimit -f 8; exec {} {args}", program().display());
+        let output = Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output().unwrap();
+        let error = error(&output);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.starts_with("error: ") && error.contains(&format!("{name}: cannot write: ")), "{error}");
+        assert_eq!(fs::read_to_string(folder.path().join(name)).unwrap(), "mine");
+    }
+    let output = run(folder.path(), "repair knot-holes.ply /dev/full --format ply -d 5 -q");
+    assert!(error(&output).starts_with("error: /dev/full: cannot write: No space left"), "{}", error(&output));
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let mut command = Command::new(program());
+    let output = command.current_dir(folder.path()).args(["info", "knot-holes.ply"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(error(&output).starts_with("error: standard output: cannot write"), "{}", error(&output));
+    assert!(names(folder.path()).iter().all(|name| !name.contains("partial")));
+}
+
+#[test]
+fn what_cannot_be_read_or_written_is_told() {
+    let folder = folder(&[("cube", 1)]);
+    let closed = Command::new("sh")
+        .current_dir(folder.path())
+        .args(["-c", &format!("{} repair cube.ply /dev/stdout --format ply -q -d 8 | true", program().display())])
+        .output()
+        .unwrap();
+    assert!(error(&closed).starts_with("error: /dev/stdout: cannot write: Broken pipe"), "{}", error(&closed));
+    // Root may write to folders that nobody may write to, but not to these.
+    let mut cases = vec![
+        ("repair cube.ply /proc/out.ply -d 4", "/proc/out.ply: cannot create"),
+        ("repair /proc/self/mem out.ply -d 4", "/proc/self/mem: cannot read"),
+    ];
+    for (name, bits) in [("locked.ply", 0o000), ("locked", 0o555)] {
+        use std::os::unix::fs::PermissionsExt;
+        let path = folder.path().join(name);
+        if name == "locked" {
+            fs::create_dir(&path).unwrap();
+        } else {
+            drop(File::create(&path).unwrap());
+        }
+        fs::set_permissions(&path, fs::Permissions::from_mode(bits)).unwrap();
+    }
+    if File::open(folder.path().join("locked.ply")).is_err() {
+        cases.push(("repair locked.ply out.ply -d 4", "locked.ply: cannot read"));
+        cases.push(("repair cube.ply locked/out.ply -d 4", "locked/out.ply: cannot create"));
+    } else {
+        println!("skipped: permissions mean nothing to this user");
+    }
+    for (args, words) in cases {
+        let output = run(folder.path(), args);
+        assert_eq!(output.status.code(), Some(1), "{args}");
+        assert!(error(&output).starts_with(&format!("error: {words}: ")), "{args}: {}", error(&output));
+    }
+    assert_eq!(names(folder.path()), ["cube.ply", "locked", "locked.ply"]);
+}
+
+/// Binary STL is read twice: what becomes of the file meanwhile is an error at most.
+#[test]
+fn files_that_shrink_or_vanish_meanwhile_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.stl");
+    write_ball(&path, 40);
+    let len = fs::metadata(&path).unwrap().len();
+    let read = |change: &dyn Fn()| {
+        let mut input = io::open(&path).unwrap();
+        input.bounds().unwrap();
+        change();
+        input.triangles(&mut |_| Ok(())).map(|counts| counts.triangles)
+    };
+    assert_eq!(read(&|| ()).unwrap(), 3200);
+    let shrunk = read(&|| File::options().write(true).open(&path).unwrap().set_len(len / 2).unwrap());
+    let message = shrunk.unwrap_err().to_string();
+    assert!(message.contains("ball.stl: "), "{message}");
+    write_ball(&path, 40);
+    // An open file is there until it is closed.
+    let vanished = read(&|| fs::remove_file(&path).unwrap());
+    assert!(vanished.is_ok_and(|triangles| triangles == 3200));
+    assert!(io::open(&path).is_err());
+}
+
+/// Files of 2 GB that hold next to nothing, in an address space of 1 GB: zeros, and headers that promise what is there, or billions.
+#[test]
+fn huge_files_of_garbage_are_refused_and_soon() {
+    let folder = tempfile::tempdir().unwrap();
+    let ply = |vertices: u64, faces: u64| {
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+             element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    let nrrd = |size: u32| {
+        format!("NRRD0005\ntype: float\ndimension: 3\nsizes: {size} {size} {size}\nencoding: raw\nendian: little\n\n")
+    };
+    let stl = |triangles: u32| String::from_utf8([&[b' '; 80][..], &triangles.to_le_bytes()].concat()).unwrap();
+    let cases = [
+        ("zeros.stl", String::new(), "info", "promises 0 triangles"),
+        ("zeros.ply", String::new(), "info", ""),
+        ("zeros.obj", String::new(), "info", "cannot read: "),
+        ("zeros.off", String::new(), "info", "cannot read: "),
+        ("zeros.glb", String::new(), "info", ""),
+        ("zeros.3mf", String::new(), "info", ""),
+        ("zeros.sog", String::new(), "info", "SOG.Format"),
+        ("zeros.sof", String::new(), "info", "0 cells a side"),
+        ("zeros.dcf", String::new(), "info", "multisign"),
+        ("zeros.mhd", String::new(), "extract", "that of no volume"),
+        ("points.ply", ply(178_000_000, 1), "info", "do not fit into memory"),
+        ("points.ply", ply(178_000_000, 1), "repair", "do not fit into memory"),
+        ("billions.ply", ply(u64::from(u32::MAX), 1), "info", ""),
+        ("faces.ply", ply(3, u64::from(u32::MAX)), "info", ""),
+        ("billions.stl", stl(0x7f7f_7f7f), "info", "promises 2139062143 triangles"),
+        ("large.nrrd", nrrd(800), "extract", "or more are needed"),
+        ("large.nrrd", nrrd(8000), "extract", "the file is cut short"),
+        ("billions.nrrd", nrrd(4_000_000), "extract", "none that a volume can have"),
+    ];
+    for (name, header, command, words) in cases {
+        let path = folder.path().join(name);
+        fs::write(&path, header).unwrap();
+        File::options().write(true).open(&path).unwrap().set_len(2 << 30).unwrap();
+        let goal = match command {
+            "extract" => "out.ply --iso 1",
+            "repair" => "out.ply",
+            _ => "",
+        };
+        let script = format!("ulimit -v 1000000; exec {} {command} {name} {goal}", program().display());
+        let start = Instant::now();
+        let output = Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output().unwrap();
+        let error = error(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {error}");
+        assert!(error.starts_with(&format!("error: {name}: ")) || command == "extract", "{name}: {error}");
+        assert!(error.contains(words) && error.lines().count() == 1, "{name}: {error}");
+        assert!(start.elapsed() < Duration::from_secs(20), "{name} took {:?}", start.elapsed());
+        fs::remove_file(path).unwrap();
+    }
+    assert_eq!(names(folder.path()), [""; 0]);
+}
+
+/// No reader goes down into what it reads by calling itself without a bound.
+#[test]
+fn deep_nesting_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = |n: usize| {
+        let nodes: Vec<String> = (1..n).map(|i| format!("{{\"children\":[{i}]}}")).collect();
+        format!(
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{},{{}}],\"scenes\":[{{\"nodes\":[0]}}]}}",
+            nodes.join(",")
+        )
+    };
+    let depth = 200_000;
+    let brackets = format!("{{\"asset\":{}{}}}", "[".repeat(depth), "]".repeat(depth));
+    let tags = |name: &str| "<a>".repeat(depth) + name + &"</a>".repeat(depth);
+    for (name, text, is_error) in [
+        ("brackets.gltf", brackets, true),
+        ("chain.gltf", chain(depth), false),
+        ("tags.vti", format!("<VTKFile type=\"ImageData\">{}</VTKFile>", tags("x")), true),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        let output = run(folder.path(), &format!("info {name}"));
+        assert_eq!(output.status.code(), Some(i32::from(is_error)), "{name}: {}", error(&output));
+        assert!(!is_error || error(&output).starts_with(&format!("error: {name}: ")), "{}", error(&output));
+    }
 }
 
 /// Writes a binary STL file of a bumpy ball with `2 n^2` triangles.

@@ -19,10 +19,11 @@ impl<'a> Builder<'a> {
         Builder { name, mesh: Mesh::default() }
     }
 
-    /// Makes room. Callers bound the numbers by the bytes they have, not by what a header says.
-    pub(super) fn reserve(&mut self, points: usize, polygons: usize, corners: usize) {
-        self.mesh.points.reserve_exact(points);
-        self.mesh.faces.reserve_exact(polygons, corners);
+    /// Makes room, or says that there is none. Callers bound the numbers by the bytes they have, not by what a header says.
+    pub(super) fn reserve(&mut self, points: usize, polygons: usize, corners: usize) -> Result<()> {
+        let room = self.mesh.points.try_reserve_exact(points);
+        let room = room.and_then(|()| self.mesh.faces.try_reserve_exact(polygons, corners));
+        room.map_err(|_| no_room(self.name, points + polygons))
     }
 
     /// Number of points so far.
@@ -58,6 +59,13 @@ impl<'a> Builder<'a> {
         let problem = format!("there are more than {limit}, which is what a mesh in memory can have");
         Error::format(self.name, Place::Whole, problem, "stream it as binary STL or PLY, or split it")
     }
+}
+
+/// The error when there is not enough memory for so many points and polygons of a file.
+#[cold]
+pub(super) fn no_room(name: &str, elements: usize) -> Error {
+    let problem = format!("{elements} vertices and faces do not fit into memory");
+    Error::format(name, Place::Whole, problem, "split the file, or take a machine with more memory")
 }
 
 /// Gives equal points of a soup one index. Points are equal when their coordinates are, bit for bit, except that -0 is 0.

@@ -27,7 +27,7 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Parsed> {
 
     let mut builder = Builder::new(name);
     // The least vertex is `0 0 0` and a line end, the least face `0` and a line end.
-    builder.reserve(points.min(bytes.len() as u64 / 6) as usize, polygons.min(bytes.len() as u64 / 2) as usize, 0);
+    builder.reserve(points.min(bytes.len() as u64 / 6) as usize, polygons.min(bytes.len() as u64 / 2) as usize, 0)?;
     for i in 0..points {
         text.skip_blanks();
         let mut coordinate = || {

@@ -6,8 +6,8 @@ use crate::mesh::{Mesh, MeshSizes, triangulate};
 use glam::{DAffine3, DVec3, Vec3};
 
 /// Vertices and triangles that a file of any size may stand for; and how many more for each of its bytes. A file of a thousand bytes can
-/// ask for the same part a million times; real ones repeat some parts a hundred times.
-const FREE: u64 = 1 << 24;
+/// ask for the same part a million times; real ones repeat some parts a hundred times. A million are some 30 MB.
+const FREE: u64 = 1 << 20;
 const PER_BYTE: u64 = 16;
 
 /// The mesh of a scene in the making.

@@ -42,6 +42,7 @@ pub use tree::{Closest, TriangleTree};
 pub use validate::Violation;
 
 use glam::DVec3;
+use std::collections::TryReserveError;
 use std::ops::Range;
 
 /// Points and polygons over them. Nothing is promised: a broken soup and a clean solid are both a `Mesh`;
@@ -105,6 +106,16 @@ impl Polygons {
             Ends::Every { room, .. } => *room = count + polygons,
             Ends::Each(ends) => ends.reserve_exact(polygons),
         }
+    }
+
+    /// As [`reserve_exact`](Self::reserve_exact), but says if there is not enough memory.
+    pub(crate) fn try_reserve_exact(&mut self, polygons: usize, corners: usize) -> Result<(), TryReserveError> {
+        self.corners.try_reserve_exact(corners)?;
+        if let Ends::Each(ends) = &mut self.ends {
+            ends.try_reserve_exact(polygons)?;
+        }
+        self.reserve_exact(polygons, corners);
+        Ok(())
     }
 
     /// Appends a polygon.

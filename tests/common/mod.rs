@@ -169,7 +169,8 @@ pub(crate) fn check_with(
     }
 }
 
-fn check_warnings(is_empty: bool, report: &RepairReport) -> Result<(), String> {
+/// Whether the report says why if the result is empty, and only then.
+pub(crate) fn check_warnings(is_empty: bool, report: &RepairReport) -> Result<(), String> {
     let says_why = report.warnings.iter().any(|w| matches!(w, Warning::NoFaces | Warning::NothingEnclosed));
     if is_empty == says_why { Ok(()) } else { Err(format!("empty: {is_empty}, warnings: {:?}", report.warnings)) }
 }

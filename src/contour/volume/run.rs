@@ -19,7 +19,7 @@ const SLAB: usize = 16;
 /// and the ones next to it.
 pub(super) trait Extractor: Sync {
     /// What a thread reuses from slice to slice.
-    type Scratch;
+    type Scratch: Send;
 
     /// Makes that.
     fn scratch(&self) -> Self::Scratch;

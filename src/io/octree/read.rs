@@ -16,7 +16,7 @@ use crate::grid::brick::Plane;
 use crate::io::bytes::Bytes;
 use crate::octree::crossings::Sample;
 use crate::octree::{SignedOctree, StoredPoints};
-use crate::progress::{Progress, Silent};
+use crate::progress::{Progress, Silent, check};
 use glam::DVec3;
 use std::fs::File;
 use std::io::Read;
@@ -63,6 +63,7 @@ fn read_from(
         let problem = "neither the content nor the name says that this is an octree";
         return Err(Error::format(name, Place::Whole, problem, "give it a name that ends in .sof, .sog or .dcf"));
     };
+    check(progress)?;
     let bytes = Bytes::new(name, reader, 0, len);
     let info = OctreeInfo {
         path: name.into(),

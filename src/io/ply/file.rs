@@ -1,12 +1,14 @@
 //! A binary PLY file as a source of triangles: vertices in memory, faces read anew from the file on each pass.
 
 use super::super::Encoding;
+use super::super::build::no_room;
 use super::super::bytes::Bytes;
 use super::body::{BigEndian, Binary, Body, LittleEndian, Order};
 use super::header::{Element, Header, Kind, Scalar};
 use crate::error::{Error, Result};
 use crate::mesh::{Batch, Bounds, SourceCounts, TriangleSource};
 use glam::{DVec3, Vec3};
+use std::collections::TryReserveError;
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::PathBuf;
@@ -38,16 +40,22 @@ enum Positions {
     Double(Vec<DVec3>),
 }
 
+/// A list with room for so many elements.
+fn with_room<T>(room: usize) -> Result<Vec<T>, TryReserveError> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(room).map(|()| list)
+}
+
 impl Positions {
-    /// No positions, but room for those of an element that is known to fit in the file.
-    fn with_room_for(element: &Element) -> Self {
+    /// No positions, but room for those of an element that is known to fit in the file; unless there is none in memory.
+    fn with_room_for(element: &Element) -> Result<Self, TryReserveError> {
         let room = element.count as usize;
         let is_coordinate = |name: &str| matches!(name, "x" | "y" | "z");
         let is_single = |kind: Kind| matches!(kind, Kind::One(Scalar::F32));
         if element.properties.iter().all(|p| !is_coordinate(&p.name) || is_single(p.kind)) {
-            Positions::Single(Vec::with_capacity(room))
+            with_room(room).map(Positions::Single)
         } else {
-            Positions::Double(Vec::with_capacity(room))
+            with_room(room).map(Positions::Double)
         }
     }
 
@@ -112,7 +120,8 @@ impl PlyFile {
             body.check_size(element)?;
             match element.name.as_str() {
                 "vertex" => {
-                    found = Positions::with_room_for(element);
+                    let room = Positions::with_room_for(element);
+                    found = room.map_err(|_| no_room(&self.name, element.count as usize))?;
                     body.points(element, |point| {
                         found.push(point);
                         Ok(())

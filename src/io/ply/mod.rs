@@ -44,12 +44,12 @@ fn read_elements(header: &Header, body: &mut impl Body, builder: &mut Builder<'_
         body.check_size(element)?;
         match element.name.as_str() {
             "vertex" => {
-                builder.reserve(element.count as usize, 0, 0);
+                builder.reserve(element.count as usize, 0, 0)?;
                 body.points(element, |point| builder.point(point))?;
             }
             "face" => {
                 let corners = (3 * element.count).min(body.left() / body.least_size(Scalar::I32));
-                builder.reserve(0, element.count as usize, corners as usize);
+                builder.reserve(0, element.count as usize, corners as usize)?;
                 body.faces(element, points, |face| builder.polygon(face))?;
             }
             "tristrips" => body.strips(element, points, |triangle| builder.polygon(&triangle))?,

@@ -63,7 +63,7 @@ pub(super) fn parse_binary(name: &str, bytes: &[u8]) -> Result<Parsed> {
     let mut reader = Cursor::new(bytes);
     let solids = Solids::find(name, &mut reader, bytes.len() as u64)?;
     let triangles = solids.triangles() as usize;
-    builder.reserve(0, triangles, 3 * triangles);
+    builder.reserve(0, triangles, 3 * triangles)?;
     solids.visit(name, &mut reader, |triangle| {
         let mut corners = [0; 3];
         for (corner, point) in corners.iter_mut().zip(triangle) {

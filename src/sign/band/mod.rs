@@ -144,12 +144,13 @@ impl Band {
     ) -> Result<Self> {
         let seeds = Seeds::new(frame.depth());
         source.triangles(&mut |batch| {
-            check(progress)?;
-            batch.par_iter().with_min_len(64).for_each(|corners| {
+            batch.par_iter().with_min_len(64).try_for_each(|corners| {
+                check(progress)?;
                 if let [Some(a), Some(b), Some(c)] = corners.map(|p| frame.snap(p)) {
-                    seeds.add_triangle(&[a, b, c], frame.cell_shift(), wanted);
+                    seeds.add_triangle(&[a, b, c], frame.cell_shift(), wanted, progress);
                 }
-            });
+                Ok(())
+            })?;
             progress.advance(batch.len() as u64);
             progress.hold(seeds.bytes() as u64)
         })?;
@@ -166,7 +167,8 @@ impl Band {
     pub fn around_crossings(crossings: &Crossings, reach: f64, progress: &dyn Progress) -> Result<Self> {
         let seeds = Seeds::new(crossings.depth());
         let (count, piece) = pieces(crossings.bricks().len(), 16);
-        (0..count).into_par_iter().for_each(|n| {
+        (0..count).into_par_iter().try_for_each(|n| {
+            check(progress)?;
             for brick in piece(n).map(|i| &crossings.bricks()[i]) {
                 let origin = crossings.origin(brick);
                 let mut place = brick.first as usize;
@@ -179,12 +181,15 @@ impl Band {
                     }
                 }
             }
-        });
+            Ok(())
+        })?;
         Band::spread(crossings.depth(), seeds, reach, progress)
     }
 
     fn spread(depth: u32, seeds: Seeds, reach: f64, progress: &dyn Progress) -> Result<Self> {
         assert!(reach <= MOST_CELLS, "ways have 16 bits");
+        // Of what was cancelled, not all may be there.
+        check(progress)?;
         // The far ends of edges that leave the band have a distance, too.
         progress.hold(seeds.bytes() as u64)?;
         let bricks = spread::spread(seeds.into_bricks(), reach + 1.0 + SLACK, progress)?;
@@ -193,7 +198,7 @@ impl Band {
             index.insert(*key, i);
         }
         let mut band = Band { depth, bricks, index };
-        band.refine(reach - 1.0);
+        band.refine(reach - 1.0, progress)?;
         Ok(band)
     }
 

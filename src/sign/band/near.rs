@@ -5,6 +5,7 @@ use crate::geom::raster::FineTriangle;
 use crate::grid::Key;
 use crate::grid::brick::Local;
 use crate::octree::LinearOctree;
+use crate::progress::Progress;
 use glam::DVec3;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -66,8 +67,8 @@ impl Seeds {
         });
     }
 
-    /// Offers a triangle's points to the lattice points about it.
-    pub(super) fn add_triangle(&self, fine: &FineTriangle, shift: u32, wanted: &impl Wanted) {
+    /// Offers a triangle's points to the lattice points about it; to fewer of them once `progress` is cancelled.
+    pub(super) fn add_triangle(&self, fine: &FineTriangle, shift: u32, wanted: &impl Wanted, progress: &dyn Progress) {
         // Corners in a fixed order, so that the same triangle gives the same roundings however it is written.
         let mut fine = *fine;
         fine.sort_unstable();
@@ -85,7 +86,7 @@ impl Seeds {
         } else {
             triangle.for_bricks(|brick| {
                 let centre = brick * 8.0 + 3.5;
-                if triangle.closest(centre).distance(centre) <= NEAR + BRICK_RADIUS {
+                if !progress.is_cancelled() && triangle.closest(centre).distance(centre) <= NEAR + BRICK_RADIUS {
                     self.add_to_brick(&triangle, brick, wanted);
                 }
             });

@@ -5,33 +5,44 @@
 //! the best of them, until none is closer.
 
 use super::{BEYOND, Band, Field, NEAR, UNIT, square};
+use crate::error::Result;
 use crate::grid::Key;
 use crate::grid::brick::Local;
 use crate::octree::crossings::lattice_point;
+use crate::progress::{Progress, check};
 use rayon::prelude::*;
+
+/// Points of a brick by their index, and shorter ways for them.
+type Found = Vec<(u16, [i16; 3])>;
 
 /// A position in 512ths of a cell.
 type Place = [i32; 3];
 
 impl Band {
     /// Refines the ways of all points at least so far from the surface, in cells.
-    pub(super) fn refine(&mut self, from: f64) {
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub(super) fn refine(&mut self, from: f64, progress: &dyn Progress) -> Result<()> {
         let least = (from.max(NEAR) * f64::from(UNIT)).powi(2) as u32;
-        let found: Vec<Vec<(u16, [i16; 3])>> = (0..self.bricks.len())
+        let found: Result<Vec<Found>> = (0..self.bricks.len())
             .into_par_iter()
             .map(|n| {
+                check(progress)?;
                 let (key, field) = &self.bricks[n];
                 let origin = lattice_point(self.depth, *key);
                 let far = (0..512).filter(|&i| field.0[0][i] != BEYOND && square(field.way(i)) >= least);
                 let mut search = Search { band: self, last: (*key, Some(field)) };
-                far.filter_map(|i| search.closer(origin, i as u16, field.way(i)).map(|way| (i as u16, way))).collect()
+                let closer = |i: usize| search.closer(origin, i as u16, field.way(i)).map(|way| (i as u16, way));
+                Ok(far.filter_map(closer).collect())
             })
             .collect();
-        for ((_, field), found) in self.bricks.iter_mut().zip(found) {
+        for ((_, field), found) in self.bricks.iter_mut().zip(found?) {
             for (i, way) in found {
                 field.offer(usize::from(i), way);
             }
         }
+        Ok(())
     }
 }
 

@@ -45,20 +45,21 @@ pub(super) fn spread(
         // At worst, all of the active ones change.
         progress.hold(((bricks.len() + active.len()) * BRICK_BYTES) as u64)?;
         let look = |key: Key| index.get(key).map(|&i| &*bricks[i as usize].1);
-        let changes: Vec<(Key, Box<Field>, Plane)> = active
+        let changes: Result<Vec<(Key, Box<Field>, Plane)>> = active
             .par_iter()
             .map_init(Halo::boxed, |halo, &key| {
+                check(progress)?;
                 halo.fill(key, look);
                 halo.sweep();
                 let field = halo.field(most);
                 let old = look(key);
                 let changed = difference(&field, old.unwrap_or(&Field::EMPTY));
-                (!changed.is_empty()).then_some((key, field, changed))
+                Ok((!changed.is_empty()).then_some((key, field, changed)))
             })
-            .flatten_iter()
+            .filter_map(Result::transpose)
             .collect();
         active.clear();
-        for (key, field, changed) in changes {
+        for (key, field, changed) in changes? {
             active.extend(changed_sides(key, &changed));
             if let Some(&i) = index.get(key) {
                 bricks[i as usize].1 = field;
