@@ -92,7 +92,9 @@
 #![forbid(unsafe_code)]
 
 pub mod contour;
+pub mod cloud;
 pub mod error;
+pub mod field;
 pub mod geom;
 pub mod grid;
 pub mod io;

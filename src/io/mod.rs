@@ -17,6 +17,8 @@
 //!
 //! Scenes of parts (glTF, 3MF) become one mesh, with the transforms of their nodes, items and components applied.
 //!
+//! Clouds of points, XYZ or PLY, come by [`read_cloud`] and go by [`write_cloud`] or a [`CloudWriter`].
+//!
 //! Signed octrees in SOF, SOG and DCF files ([`OctreeFormat`]) come and go by [`read_octree`], [`write_sof`], [`write_sog`] and
 //! [`write_dcf`]. Volumes have a [module](volume) of their own.
 //!
@@ -42,6 +44,7 @@ mod obj;
 mod octree;
 mod off;
 mod ply;
+mod points;
 #[cfg(any(feature = "gltf", feature = "3mf"))]
 mod scene;
 pub mod skeleton;
@@ -59,6 +62,7 @@ pub use input::{Input, InputInfo, open};
 pub use octree::{
     OctreeFile, OctreeFormat, OctreeInfo, read_octree, read_octree_bytes, write_dcf, write_sof, write_sog,
 };
+pub use points::{CloudFormat, CloudWriter, read_cloud, read_cloud_bytes, write_cloud};
 pub use write::{WriteOptions, Writer, create, write};
 
 use crate::error::{Error, Place, Result};

@@ -1,5 +1,6 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod clouds;
 mod hull;
 mod inside;
 mod memory;

@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod compare;
+mod fields;
 mod local;
 mod repair;
 mod topology;
@@ -8,6 +9,7 @@ mod values;
 mod volume;
 
 pub(crate) use compare::CompareArgs;
+pub(crate) use fields::{CloudArgs, PointsArgs};
 pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
@@ -38,6 +40,7 @@ Examples:
   zmend repair broken.ply fixed.ply           repair it
   zmend topology fixed.ply clean.ply --cut 2  cut its thin handles
   zmend extract scan.mhd scan.ply --iso 300   the surface of a volume
+  zmend surface points.xyz part.stl           the surface that points were taken of
   zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
@@ -82,6 +85,8 @@ pub(crate) enum Command {
     Topology(TopologyArgs),
     Extract(ExtractArgs),
     Remesh(RemeshArgs),
+    Surface(CloudArgs),
+    Points(PointsArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Heal(HealArgs),

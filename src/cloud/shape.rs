@@ -1,0 +1,80 @@
+//! What the neighbours of each point say: how dense the points are, and which way the surface lies.
+
+use super::orient::oriented;
+use super::{Cloud, NONE, Near, Plane};
+use crate::error::Result;
+use crate::progress::{Progress, check};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Points looked at a time.
+const BATCH: usize = 1024;
+
+/// Normals by less than this (cosine) apart belong to one sheet.
+const SAME_SHEET: f64 = 0.3;
+
+/// Spacing, normals and areas of the points of a cloud.
+#[derive(Debug, Clone)]
+pub struct Shape {
+    /// Unit normals, outward.
+    pub normals: Vec<DVec3>,
+    /// The part of the surface that each point stands for, in model units squared.
+    pub areas: Vec<f64>,
+    /// The middle one of the roots of all areas: how far neighbours are from each other.
+    pub spacing: f64,
+    /// The distance below which 98 of 100 points have their neighbours, in the same measure.
+    pub wide_spacing: f64,
+    /// How many points had the orientation of their normals from what infinity reaches; the others have that of their neighbours. None if
+    /// normals were given.
+    pub seen_from_outside: usize,
+}
+
+impl Shape {
+    /// Looks at the `count` nearest of each point. Normals that the cloud has are kept; else they are those of planes through the nearest points,
+    /// turned to where infinity reaches without coming between points that are less than `gap` apart (found from the spacing when not
+    /// given), or as their neighbours are.
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub fn of(cloud: &Cloud, near: &Near, count: usize, gap: Option<f64>, progress: &dyn Progress) -> Result<Shape> {
+        check(progress)?;
+        let nearest = near.nearest(count);
+        check(progress)?;
+        let of = |i: usize| nearest[count * i..][..count].iter().copied().take_while(|&j| j != NONE).map(|j| j as usize);
+        let points = &cloud.points;
+        let extent = points.len().min(count);
+        // A point with nothing near it stands for nothing.
+        let alone = |i: usize| of(i).last().map_or(0.0, |j| points[i].distance(points[j]) * (PI / extent as f64).sqrt());
+        let spacings: Vec<f64> = (0..points.len()).into_par_iter().map(alone).collect();
+        let mut sorted = spacings.clone();
+        sorted.par_sort_unstable_by(f64::total_cmp);
+        let quantile = |q: f64| sorted.get(((sorted.len() as f64 - 1.0) * q) as usize).copied().unwrap_or(0.0);
+        let (spacing, wide_spacing) = (quantile(0.5), quantile(0.98));
+
+        let mut seen_from_outside = 0;
+        let normals: Vec<DVec3> = if cloud.has_normals() {
+            cloud.normals.par_iter().map(|n| n.normalize_or_zero()).collect()
+        } else {
+            let normal = |i: usize| {
+                let around = std::iter::once(i).chain(of(i)).map(|j| points[j]);
+                Plane::fit(around).map_or(DVec3::ZERO, |plane| plane.normal)
+            };
+            let normals: Vec<DVec3> = (0..points.len()).into_par_iter().with_min_len(BATCH).map(normal).collect();
+            check(progress)?;
+            let gap = gap.unwrap_or(4.0 * wide_spacing);
+            let (normals, seen) = oriented(points, normals, &nearest, count, gap, progress)?;
+            seen_from_outside = seen;
+            normals
+        };
+        let area = |i: usize| {
+            let same = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).count();
+            let Some(last) = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).last() else {
+                return spacings[i] * spacings[i];
+            };
+            PI * points[i].distance_squared(points[last]) / same as f64
+        };
+        let areas = (0..points.len()).into_par_iter().with_min_len(BATCH).map(area).collect();
+        Ok(Shape { normals, areas, spacing, wide_spacing, seen_from_outside })
+    }
+}
