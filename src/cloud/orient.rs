@@ -5,8 +5,7 @@
 //! points; so it is the mirrored normal that is compared, and not the normal itself: that is right at sharp edges, and across thin walls, where
 //! normals of neighbours are at right angles or opposite.
 
-use super::NONE;
-use super::outside::votes;
+use super::{NONE, outside};
 use crate::error::Result;
 use crate::progress::{Progress, check};
 use glam::DVec3;
@@ -39,7 +38,8 @@ impl Ord for Link {
     }
 }
 
-/// Normals turned outward, and how many of them as infinity sees them. `nearest` lists `count` neighbours a point.
+/// Normals turned outward, and how many of them as infinity sees them: of several gaps, the one with which most are seen for sure, or the first of
+/// those. Too narrow a gap lets infinity in, and too wide a one closes what is open. `nearest` lists `count` neighbours a point.
 ///
 /// # Errors
 /// `Cancelled`.
@@ -48,11 +48,19 @@ pub(super) fn oriented(
     mut normals: Vec<DVec3>,
     nearest: &[u32],
     count: usize,
-    gap: f64,
+    gaps: &[f64],
     progress: &dyn Progress,
 ) -> Result<(Vec<DVec3>, usize)> {
-    let votes = votes(points, &normals, gap, progress)?;
-    check(progress)?;
+    let mut votes = vec![0.0; points.len()];
+    let mut most = 0;
+    for &gap in gaps {
+        check(progress)?;
+        let these = outside::votes(points, &normals, gap, progress)?;
+        let sure = these.iter().filter(|vote| vote.abs() >= SURE).count();
+        if sure > most {
+            (votes, most) = (these, sure);
+        }
+    }
     let mut known = vec![false; points.len()];
     let mut seen = 0;
     for ((normal, known), vote) in normals.iter_mut().zip(&mut known).zip(&votes) {

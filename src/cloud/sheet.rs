@@ -9,6 +9,7 @@
 //! Where the surface crosses an edge of the lattice, points count less whose normals are unlike that of the nearest one (Oztireli, Guennebaud and Gross
 //! 2009 do so), so that sharp edges stay nearly as sharp as the points have them.
 
+use super::dipoles::View;
 use super::{Cloud, Dipoles, Near, Shape};
 use crate::field::{Edge, Function, Zero};
 use crate::geom::Bounds;
@@ -68,7 +69,7 @@ impl Sheet {
     }
 
     /// Calls `each` with the places and the points about them, in stretches of places so near to each other that the points are the same for all.
-    fn stretches<T>(&self, items: &[T], place: impl Fn(&T) -> DVec3, mut each: impl FnMut(&[T], &[u32])) {
+    fn stretches<T>(&self, items: &[T], place: impl Fn(&T) -> DVec3, mut each: impl FnMut(&[T], &[u32], Bounds)) {
         let mut points = Vec::new();
         let mut start = 0;
         while start < items.len() {
@@ -88,7 +89,7 @@ impl Sheet {
                 let about = Bounds { min: bounds.min - self.reach, max: bounds.max + self.reach };
                 points.extend(self.near.in_box(&about).flatten());
             }
-            each(&items[start..end], &points);
+            each(&items[start..end], &points, bounds);
             start = end;
         }
     }
@@ -116,8 +117,8 @@ impl Sheet {
         blend
     }
 
-    fn value(&self, place: DVec3, points: &[u32]) -> f64 {
-        let winding = self.dipoles.winding(place);
+    fn value(&self, place: DVec3, points: &[u32], view: &View) -> f64 {
+        let winding = view.winding(place);
         let by_winding = (0.5 - winding) * 2.0 * self.spacing;
         let blend = self.blend(place, points, None);
         let is_sure = blend.weight >= LEAST_WEIGHT && blend.normal.length() >= LEAST_AGREEMENT;
@@ -157,11 +158,18 @@ impl Sheet {
 
 impl Function for Sheet {
     fn values(&self, places: &[DVec3], out: &mut Vec<f64>) {
-        self.stretches(places, |&p| p, |places, points| out.extend(places.iter().map(|&p| self.value(p, points))));
+        self.stretches(
+            places,
+            |&p| p,
+            |places, points, bounds| {
+                let view = self.dipoles.seen_from(bounds.center(), 0.5 * bounds.extent().length());
+                out.extend(places.iter().map(|&p| self.value(p, points, &view)));
+            },
+        );
     }
 
     fn zeros(&self, edges: &[Edge], out: &mut Vec<Zero>) {
         let place = |edge: &Edge| edge.place(0.5);
-        self.stretches(edges, place, |edges, points| out.extend(edges.iter().map(|edge| self.zero(edge, points))));
+        self.stretches(edges, place, |edges, points, _| out.extend(edges.iter().map(|edge| self.zero(edge, points))));
     }
 }

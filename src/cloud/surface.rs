@@ -11,6 +11,7 @@ use crate::octree::LinearOctree;
 use crate::octree::crossings::lattice_point;
 use crate::octree::point_set::PointSet;
 use crate::progress::{Progress, Stage, check};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The deepest octree that is made unless one is asked for: 4096 cells a side.
@@ -123,21 +124,21 @@ fn frame(cloud: &Cloud, options: &CloudOptions, spacing: f64) -> Result<Frame> {
     Err(Error::setting("depth", problem, format!("take depth {} to {}", COARSEST + 1, DEPTHS.end())))
 }
 
-/// The tree of the frame's depth that is finest within two cells of all points.
+/// The tree of the frame's depth that is finest within a cell of all points.
 fn tree(cloud: &Cloud, frame: &Frame) -> LinearOctree<()> {
-    // In cells of twice the size, those of the points and those beside them.
+    // In cells of twice the size: those within half such a cell along each axis.
     let depth = frame.depth() - 1;
     if depth < 3 + COARSEST {
         return LinearOctree::build(frame.depth(), |_| true, |_| ());
     }
-    let mut cells: Vec<(Key, Local)> = cloud
-        .points
-        .par_iter()
-        .filter_map(|&p| {
-            let [x, y, z] = ((p - frame.origin()) / (2.0 * frame.cell_size())).to_array().map(|c| c as u32);
+    let around = |p: &DVec3| {
+        let at = (*p - frame.origin()) / (2.0 * frame.cell_size());
+        (0..8).filter_map(move |corner| {
+            let [x, y, z] = [0, 1, 2].map(|a| (at[a] + f64::from(corner >> a & 1) - 0.5) as u32);
             Some((Key::cell(depth - 3, [x >> 3, y >> 3, z >> 3])?, Local::new(x, y, z)))
         })
-        .collect();
+    };
+    let mut cells: Vec<(Key, Local)> = cloud.points.par_iter().flat_map_iter(around).collect();
     cells.par_sort_unstable();
     let mut planes: Vec<(Key, Plane)> = Vec::new();
     for (key, local) in cells {
@@ -146,7 +147,7 @@ fn tree(cloud: &Cloud, frame: &Frame) -> LinearOctree<()> {
         }
         planes.last_mut().expect("just made").1.set(local);
     }
-    let set = PointSet::new(depth, planes).dilated();
+    let set = PointSet::new(depth, planes);
     let split = |cell: Key| {
         let level = cell.level().expect("a cell");
         if level < COARSEST {

@@ -178,10 +178,16 @@ impl Field {
 
     /// Whether a leaf has values of both signs, or lies at the root's boundary, beyond which all is outside, and has one that is not.
     pub(super) fn is_mixed(&self, leaf: Key) -> bool {
-        let Some(places) = self.nodes.places(leaf) else { return false };
-        let inside = places.iter().filter(|&&value| value < 0.0).count();
+        let value = |point: Key| self.nodes.value(point).expect("the corner of a leaf is a node");
+        let corners = leaf.corners().map(|point| value(point) < 0.0);
         let is_at_boundary = leaf.min_corner().contains(&0) || leaf.max_corner().contains(&SIDE);
-        inside > 0 && (inside < places.len() || is_at_boundary)
+        if corners.contains(&true) && (corners.contains(&false) || is_at_boundary) {
+            return true;
+        }
+        // Nothing hangs on the finest leaves.
+        let may_have_hanging = leaf.level() < Some(self.frame.depth());
+        let differs = |&value: &f64| (value < 0.0) != corners[0];
+        may_have_hanging && self.nodes.places(leaf).is_some_and(|places| places.iter().any(differs))
     }
 }
 

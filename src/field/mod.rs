@@ -1,8 +1,8 @@
 //! Level sets on octrees: functions of space, negative inside, sampled where it matters.
 //!
 //! A [`Field`] has values at the corners of the leaves of an octree and is continuous between them (see [`NodalOctree`]). It is made of any
-//! [`Function`], fine where the surface is curved and coarse elsewhere; of a mesh, by distance and winding number, by
-//! [`repair::distance_field`](crate::repair::distance_field); or of [points](crate::cloud). Fields can be joined, cut, moved and mixed
+//! [`Function`], fine where the surface is curved and coarse elsewhere; of a mesh, by distance from the solid that it encloses, by
+//! [`Solid::distance_field`](crate::Solid::distance_field); or of [points](crate::cloud). Fields can be joined, cut, moved and mixed
 //! ([`union`](Field::union), [`intersection`](Field::intersection), [`difference`](Field::difference), [`offset`](Field::offset),
 //! [`morph`](Field::morph)).
 //!
@@ -33,14 +33,21 @@
 //! # Ok::<(), zmend::Error>(())
 //! ```
 //!
+//! # Cells
+//!
+//! [`Hexahedra`] are the leaves of such a tree as elements of a simulation, sorted into inside, outside and cut: see
+//! [`Solid::cells`](crate::Solid::cells), and [`Solid::distance_field`](crate::Solid::distance_field) for the distance from any solid.
+//!
 //! # Cost
 //!
 //! 20 to 40 bytes a node in a hash table, 4 a leaf. About 1.2 nodes a leaf near a surface. Each node is asked for once.
 
 mod build;
+pub(crate) mod cells;
 mod combine;
 mod function;
 mod signed;
 
 pub use build::{Adapt, Field};
+pub use cells::{Hexahedra, Side};
 pub use function::{Edge, Function, Zero};

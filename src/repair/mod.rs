@@ -1,6 +1,7 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
 mod clouds;
+mod distances;
 mod hull;
 mod inside;
 mod memory;
@@ -12,6 +13,7 @@ mod solid;
 mod trace;
 
 pub use crate::sign::{Keep, Kept, Offset, Thicken};
+pub use distances::CellOptions;
 pub use inside::{InsideChoice, Reason};
 pub use options::{Faces, Inside, Options, Surface};
 pub use report::{RepairReport, Warning};
