@@ -15,6 +15,9 @@ use std::collections::BinaryHeap;
 /// Votes from here on are not overruled by neighbours.
 const SURE: f64 = 0.999;
 
+/// Part of the points seen at best that are nearly as many.
+const ENOUGH: f64 = 0.8;
+
 /// A link to a point that is not oriented yet. Greater is surer; of equals, the lower numbers.
 #[derive(Debug, PartialEq)]
 struct Link {
@@ -38,8 +41,9 @@ impl Ord for Link {
     }
 }
 
-/// Normals turned outward, and how many of them as infinity sees them: of several gaps, the one with which most are seen for sure, or the first of
-/// those. Too narrow a gap lets infinity in, and too wide a one closes what is open. `nearest` lists `count` neighbours a point.
+/// Normals turned outward, and how many of them as infinity sees them. Too narrow a gap lets infinity in, and hardly any point is seen for sure; too
+/// wide a one closes what is open. So of several gaps, from narrow to wide, the first one is taken with which nearly as many are seen as with any.
+/// `nearest` lists `count` neighbours a point.
 ///
 /// # Errors
 /// `Cancelled`.
@@ -51,16 +55,16 @@ pub(super) fn oriented(
     gaps: &[f64],
     progress: &dyn Progress,
 ) -> Result<(Vec<DVec3>, usize)> {
-    let mut votes = vec![0.0; points.len()];
-    let mut most = 0;
+    let mut tried = Vec::with_capacity(gaps.len());
     for &gap in gaps {
         check(progress)?;
-        let these = outside::votes(points, &normals, gap, progress)?;
-        let sure = these.iter().filter(|vote| vote.abs() >= SURE).count();
-        if sure > most {
-            (votes, most) = (these, sure);
-        }
+        let votes = outside::votes(points, &normals, gap, progress)?;
+        let sure = votes.iter().filter(|vote| vote.abs() >= SURE).count();
+        tried.push((sure, votes));
     }
+    let most = tried.iter().map(|tried| tried.0).max().unwrap_or(0);
+    let enough = tried.into_iter().find(|tried| tried.0 as f64 >= ENOUGH * most as f64);
+    let votes = enough.map_or_else(|| vec![0.0; points.len()], |tried| tried.1);
     let mut known = vec![false; points.len()];
     let mut seen = 0;
     for ((normal, known), vote) in normals.iter_mut().zip(&mut known).zip(&votes) {

@@ -21,8 +21,8 @@ use rayon::prelude::*;
 const STEPS: usize = 2;
 /// See [`STEPS`]: two cells less half of one, since points are rounded to the lattice.
 const CLOSES: f64 = 1.5;
-/// Ways out of walls are looked for up to so many cells, in halves.
-const REACH: u32 = 9;
+/// Ways out of walls are looked for up to so many cells, in halves: farther on, a way leads through the body and out on its other side.
+const REACH: u32 = 5;
 
 /// The dilated points as closed edges: those with one end in the set.
 struct Wall {

@@ -14,6 +14,11 @@ const BATCH: usize = 1024;
 /// Normals by less than this (cosine) apart belong to one sheet.
 const SAME_SHEET: f64 = 0.3;
 
+/// How often normals are filtered that were found by planes.
+const FILTERS: usize = 3;
+/// Normals 45 degrees apart count e^-2 in filters.
+const UNLIKE: f64 = 0.3;
+
 /// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to two.
 const GAPS: [f64; 4] = [1.6, 2.3, 3.2, 4.5];
 
@@ -68,7 +73,7 @@ impl Shape {
             let gaps = gap.map_or_else(|| GAPS.map(|n| n * wide_spacing).to_vec(), |gap| vec![gap]);
             let (normals, seen) = oriented(points, normals, &nearest, count, &gaps, progress)?;
             seen_from_outside = seen;
-            normals
+            (0..FILTERS).fold(normals, |normals, _| filtered(&normals, |i| of(i)))
         };
         let area = |i: usize| {
             let same = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).count();
@@ -80,4 +85,16 @@ impl Shape {
         let areas = (0..points.len()).into_par_iter().with_min_len(BATCH).map(area).collect();
         Ok(Shape { normals, areas, spacing, wide_spacing, seen_from_outside })
     }
+}
+
+/// Each normal as the mean of those near it, which count less the more they differ: where planes were fitted across an edge, normals turn to one side
+/// (the bilateral filter of Tomasi and Manduchi 1998).
+fn filtered<I: Iterator<Item = usize>>(normals: &[DVec3], nearest: impl Fn(usize) -> I + Sync) -> Vec<DVec3> {
+    let mean = |i: usize| {
+        let own = normals[i];
+        let others = nearest(i).map(|j| normals[j] * (-own.distance_squared(normals[j]) / UNLIKE).exp());
+        let mean = others.fold(own, |sum, n| sum + n).normalize_or_zero();
+        if mean == DVec3::ZERO { own } else { mean }
+    };
+    (0..normals.len()).into_par_iter().with_min_len(BATCH).map(mean).collect()
 }

@@ -17,6 +17,7 @@ mod interrupt;
 mod json;
 mod measure;
 mod memory;
+mod octmesh;
 mod print;
 mod render;
 mod repair;
@@ -58,6 +59,7 @@ fn run(args: &Args) -> Result<ExitCode> {
         Command::Remesh(args) => repair::remesh(args),
         Command::Surface(args) => cloud::surface(args),
         Command::Points(args) => cloud::points(args),
+        Command::Octmesh(args) => octmesh::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Heal(args) => heal::run(args),

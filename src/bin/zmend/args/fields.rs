@@ -1,11 +1,12 @@
-//! What `zmend surface` and `zmend points` understand.
+//! What `zmend surface`, `zmend points` and `zmend octmesh` understand.
 
-use super::repair::{FacesArg, SurfaceArg, TellArgs, WriteArgs};
+use super::repair::{FacesArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 use super::topology::HandleArgs;
 use super::values::{Limit, bytes, cell, depth_range, keep, limit, scale, width};
 use clap::{ValueEnum, value_parser};
 use std::path::PathBuf;
 use zmend::cloud::{CloudOptions, Pattern};
+use zmend::repair::CellOptions;
 use zmend::{Keep, Options};
 
 /// Make a closed, manifold, oriented surface of points.
@@ -143,6 +144,64 @@ impl From<PatternArg> for Pattern {
         match arg {
             PatternArg::Poisson => Pattern::Poisson,
             PatternArg::Regular => Pattern::Regular,
+        }
+    }
+}
+
+/// Make a mesh of hexahedra in and around a body, fine along its surface, or sample the distance from it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  zmend octmesh part.stl part.vtu
+  zmend octmesh part.stl part.vtu --depth 9 --coarsest 4
+  zmend octmesh part.stl inside.vtu --only inside,cut        the body alone
+  zmend octmesh part.sog part.vtu                            of an octree file
+  zmend octmesh part.stl distance.mha --depth 7              129 x 129 x 129 samples of the signed distance
+
+Cells along the surface have the depth of the grid, others are as large as they may be: neighbours across a face differ by one level at most, so nodes hang \
+in the middle of faces and edges. Cells have the data `level` and `side` (0 outside, 1 inside, 2 cut by the surface), points have `distance`, below 0 inside. \
+Inside and outside are told as `zmend repair` does.")]
+pub(crate) struct OctmeshArgs {
+    /// Mesh, or octree file (.sof, .sog, .dcf).
+    #[arg(value_name = "IN")]
+    pub(crate) input: PathBuf,
+    /// File to write: .vtu for cells, .mha or .nrrd for samples of the distance.
+    #[arg(value_name = "OUT")]
+    pub(crate) out: PathBuf,
+    /// Level of the largest cells: the cube round the model has level 0.
+    #[arg(long, value_name = "N", default_value_t = 3, help_heading = "Cells")]
+    pub(crate) coarsest: u32,
+    /// Which cells are written.
+    #[arg(long, value_name = "SIDES", value_enum, value_delimiter = ',', default_values_t = [SideArg::Outside, SideArg::Inside, SideArg::Cut], help_heading = "Cells")]
+    pub(crate) only: Vec<SideArg>,
+    /// Leave distances out.
+    #[arg(long, help_heading = "Cells")]
+    pub(crate) no_distances: bool,
+    #[command(flatten)]
+    pub(crate) work: WorkArgs,
+}
+
+/// Where cells are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SideArg {
+    /// All of the cell is outside.
+    Outside,
+    /// All of the cell is inside.
+    Inside,
+    /// The surface passes through the cell.
+    Cut,
+}
+
+impl OctmeshArgs {
+    /// Which cells are made.
+    pub(crate) fn cells(&self) -> CellOptions {
+        let has = |side: SideArg| self.only.contains(&side);
+        CellOptions {
+            coarsest: self.coarsest,
+            outside: has(SideArg::Outside),
+            inside: has(SideArg::Inside),
+            cut: has(SideArg::Cut),
+            distances: !self.no_distances,
         }
     }
 }

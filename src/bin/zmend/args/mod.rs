@@ -9,7 +9,7 @@ mod values;
 mod volume;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use fields::{CloudArgs, PointsArgs};
+pub(crate) use fields::{CloudArgs, OctmeshArgs, PointsArgs};
 pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
@@ -62,6 +62,7 @@ pub(crate) fn parse() -> Args {
         Command::Repair(args) => Some(&mut args.work),
         Command::Topology(args) => Some(&mut args.work),
         Command::Remesh(args) => Some(&mut args.work),
+        Command::Octmesh(args) => Some(&mut args.work),
         _ => None,
     };
     if let (Some(work), Some((_, matches))) = (work, matches.subcommand()) {
@@ -87,6 +88,7 @@ pub(crate) enum Command {
     Remesh(RemeshArgs),
     Surface(CloudArgs),
     Points(PointsArgs),
+    Octmesh(OctmeshArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Heal(HealArgs),
