@@ -91,8 +91,8 @@
 //! in files of volumes. `serde` lets octrees be serialised.
 #![forbid(unsafe_code)]
 
-pub mod contour;
 pub mod cloud;
+pub mod contour;
 pub mod error;
 pub mod field;
 pub mod geom;

@@ -58,7 +58,8 @@ impl Dipoles {
         let dipoles = normals.iter().zip(areas).map(|(&n, &area)| n * area).collect();
         let soft = areas.iter().map(|area| SOFT * area).collect();
         let mut tree = Dipoles { points: points.to_vec(), dipoles, soft, groups: Vec::new(), height };
-        tree.groups = (0..2usize << height).into_par_iter().with_min_len(64).map(|node| tree.group(node.max(1))).collect();
+        tree.groups =
+            (0..2usize << height).into_par_iter().with_min_len(64).map(|node| tree.group(node.max(1))).collect();
         tree
     }
 
@@ -253,7 +254,9 @@ mod tests {
         let spacing = (4.0 * PI / 3000.0f64).sqrt();
         for i in 0..500 {
             let way = cloud.points[6 * i];
-            for (radius, expected) in [(0.0, 1.0), (0.5, 1.0), (1.0 - 3.0 * spacing, 1.0), (1.0 + 3.0 * spacing, 0.0), (3.0, 0.0)] {
+            for (radius, expected) in
+                [(0.0, 1.0), (0.5, 1.0), (1.0 - 3.0 * spacing, 1.0), (1.0 + 3.0 * spacing, 0.0), (3.0, 0.0)]
+            {
                 let found = dipoles.winding(radius * way);
                 assert!((found - expected).abs() < 0.03, "{radius}: {found}");
             }

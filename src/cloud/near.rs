@@ -48,7 +48,8 @@ impl Near {
         let (tree, order) = LinearOctree::of_points(&places, MOST, crate::grid::key::MAX_LEVEL);
         assert_eq!(order.len(), cloud.points.len(), "all points are finite");
         let points: Vec<DVec3> = order.iter().map(|&i| cloud.points[i as usize]).collect();
-        let normals = if cloud.has_normals() { order.iter().map(|&i| cloud.normals[i as usize]).collect() } else { Vec::new() };
+        let normals =
+            if cloud.has_normals() { order.iter().map(|&i| cloud.normals[i as usize]).collect() } else { Vec::new() };
         (Cloud { points: points.clone(), normals }, Near { points, tree, origin, scale })
     }
 
@@ -88,8 +89,12 @@ impl Near {
     /// # Panics
     /// When `count` is 0.
     pub fn nearest(&self, count: usize) -> Vec<u32> {
-        let leaves: Vec<(Key, Range<u32>)> =
-            self.tree.iter_z().map(|(leaf, range)| (leaf, range.clone())).filter(|(_, range)| !range.is_empty()).collect();
+        let leaves: Vec<(Key, Range<u32>)> = self
+            .tree
+            .iter_z()
+            .map(|(leaf, range)| (leaf, range.clone()))
+            .filter(|(_, range)| !range.is_empty())
+            .collect();
         let mut found = vec![NONE; count * self.points.len()];
         let mut rest = &mut found[..];
         let mut jobs = Vec::with_capacity(leaves.len());
@@ -105,7 +110,14 @@ impl Near {
     }
 
     /// Those of the points of a leaf.
-    fn nearest_of_leaf(&self, leaf: Key, range: Range<u32>, count: usize, found: &mut [u32], scratch: &mut Vec<(f64, u32)>) {
+    fn nearest_of_leaf(
+        &self,
+        leaf: Key,
+        range: Range<u32>,
+        count: usize,
+        found: &mut [u32],
+        scratch: &mut Vec<(f64, u32)>,
+    ) {
         let wanted = count.min(self.points.len() - 1);
         let mut around = Bounds::EMPTY;
         self.points[range.start as usize..range.end as usize].iter().for_each(|&p| around.add(p));

@@ -129,7 +129,9 @@ pub(super) fn votes(points: &[DVec3], normals: &[DVec3], gap: f64, progress: &dy
         .par_iter()
         .zip(normals)
         .with_min_len(256)
-        .map(|(&p, &n)| (regions.of_point(on_lattice(p)), if n == DVec3::ZERO { [None; 2] } else { [exit(p, n), exit(p, -n)] }))
+        .map(|(&p, &n)| {
+            (regions.of_point(on_lattice(p)), if n == DVec3::ZERO { [None; 2] } else { [exit(p, n), exit(p, -n)] })
+        })
         .collect();
     let walls = reached(&seen, regions.count());
     let vote = |(wall, exits): &(u32, [Exit; 2])| {

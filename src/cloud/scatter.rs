@@ -106,7 +106,9 @@ pub fn scatter_into(
         Ok(())
     };
     match options.pattern {
-        Pattern::Poisson => faces.darts((expected * DARTS).ceil().max(DARTS) as u64, options.seed, &mut offer, progress)?,
+        Pattern::Poisson => {
+            faces.darts((expected * DARTS).ceil().max(DARTS) as u64, options.seed, &mut offer, progress)?
+        }
         Pattern::Regular => faces.rows(spacing, &mut offer, progress)?,
     }
     Ok(count)
@@ -183,7 +185,12 @@ impl<'a> Faces<'a> {
     }
 
     /// Offers rows of places over each face.
-    fn rows(&self, spacing: f64, offer: &mut dyn FnMut(DVec3, DVec3) -> Result<()>, progress: &dyn Progress) -> Result<()> {
+    fn rows(
+        &self,
+        spacing: f64,
+        offer: &mut dyn FnMut(DVec3, DVec3) -> Result<()>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         progress.begin(Stage::Measure, self.corners.len() as u64);
         let steps = |length: f64| (length / spacing).ceil().max(1.0) as u64;
         for face in 0..self.corners.len() {

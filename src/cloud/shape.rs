@@ -49,11 +49,13 @@ impl Shape {
         check(progress)?;
         let nearest = near.nearest(count);
         check(progress)?;
-        let of = |i: usize| nearest[count * i..][..count].iter().copied().take_while(|&j| j != NONE).map(|j| j as usize);
+        let of =
+            |i: usize| nearest[count * i..][..count].iter().copied().take_while(|&j| j != NONE).map(|j| j as usize);
         let points = &cloud.points;
         let extent = points.len().min(count);
         // A point with nothing near it stands for nothing.
-        let alone = |i: usize| of(i).last().map_or(0.0, |j| points[i].distance(points[j]) * (PI / extent as f64).sqrt());
+        let alone =
+            |i: usize| of(i).last().map_or(0.0, |j| points[i].distance(points[j]) * (PI / extent as f64).sqrt());
         let spacings: Vec<f64> = (0..points.len()).into_par_iter().map(alone).collect();
         let mut sorted = spacings.clone();
         sorted.par_sort_unstable_by(f64::total_cmp);

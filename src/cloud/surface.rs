@@ -64,7 +64,11 @@ impl Field {
     ///
     /// # Errors
     /// When an option is out of range, or there are fewer than four points; `Cancelled`, and `Memory` when `progress` says so.
-    pub fn of_cloud(cloud: &Cloud, options: &CloudOptions, progress: &dyn Progress) -> Result<(Field, Sheet, CloudReport)> {
+    pub fn of_cloud(
+        cloud: &Cloud,
+        options: &CloudOptions,
+        progress: &dyn Progress,
+    ) -> Result<(Field, Sheet, CloudReport)> {
         if !NEIGHBOURS.contains(&options.neighbours) {
             let problem = format!("{} is not {} to {}", options.neighbours, NEIGHBOURS.start(), NEIGHBOURS.end());
             return Err(Error::setting("neighbours", problem, "12 suits most clouds"));
@@ -159,9 +163,8 @@ fn tree(cloud: &Cloud, frame: &Frame) -> LinearOctree<()> {
         let plane = set.plane(cell.ancestor(depth - 3));
         let low = lattice_point(depth, cell);
         let side = 1 << (depth - level);
-        (0..side * side * side).any(|i| {
-            plane.get(Local::new(low[0] + i / side / side, low[1] + i / side % side, low[2] + i % side))
-        })
+        (0..side * side * side)
+            .any(|i| plane.get(Local::new(low[0] + i / side / side, low[1] + i / side % side, low[2] + i % side)))
     };
     LinearOctree::build(frame.depth(), split, |_| ())
 }

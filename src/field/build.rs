@@ -87,7 +87,12 @@ impl Field {
     ///
     /// # Panics
     /// When a leaf is finer than the cells of the frame.
-    pub fn on_tree(frame: Frame, tree: LinearOctree<()>, function: &impl Function, progress: &dyn Progress) -> Result<Field> {
+    pub fn on_tree(
+        frame: Frame,
+        tree: LinearOctree<()>,
+        function: &impl Function,
+        progress: &dyn Progress,
+    ) -> Result<Field> {
         let nodes = NodalOctree::new();
         let mut field = Field { nodes, frame };
         field.take(tree, function, progress)?;

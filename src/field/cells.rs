@@ -95,8 +95,13 @@ pub(crate) fn cells_of(octree: &SignedOctree, coarsest: u32) -> LinearOctree<Sid
 
 impl Hexahedra {
     /// Those of the cells of a tree for which the answer is yes, in order, without distances. Sorts 8 bytes a corner.
-    pub(crate) fn of_tree(tree: &LinearOctree<Side>, frame: &Frame, wanted: impl Fn(Side) -> bool + Sync) -> (Self, Vec<Key>) {
-        let leaves: Vec<(Key, Side)> = tree.iter_z().map(|(leaf, &side)| (leaf, side)).filter(|leaf| wanted(leaf.1)).collect();
+    pub(crate) fn of_tree(
+        tree: &LinearOctree<Side>,
+        frame: &Frame,
+        wanted: impl Fn(Side) -> bool + Sync,
+    ) -> (Self, Vec<Key>) {
+        let leaves: Vec<(Key, Side)> =
+            tree.iter_z().map(|(leaf, &side)| (leaf, side)).filter(|leaf| wanted(leaf.1)).collect();
         let mut corners: Vec<Key> = leaves.par_iter().flat_map_iter(|(leaf, _)| leaf.corners()).collect();
         corners.par_sort_unstable();
         corners.dedup();

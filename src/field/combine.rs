@@ -165,7 +165,9 @@ mod tests {
         let a = ball(0.0, 1.0, 0.1);
         let other = Frame::new(DVec3::splat(-2.5), 5.0, 6).expect("a cube");
         let b = Field::build(other, &|p: DVec3| p.x, Adapt::default(), &Silent).expect("a field");
-        assert!(a.union(&b, &Silent).expect_err("different").to_string().starts_with("box: the fields lie in different"));
+        assert!(
+            a.union(&b, &Silent).expect_err("different").to_string().starts_with("box: the fields lie in different")
+        );
         assert!(a.morph(&a, 1.5, &Silent).is_err() && a.morph(&a, f64::NAN, &Silent).is_err());
     }
 }

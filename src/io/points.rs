@@ -155,7 +155,12 @@ impl CloudWriter {
     ///
     /// # Errors
     /// When the file cannot be created.
-    pub fn create(path: impl AsRef<Path>, format: CloudFormat, with_normals: bool, resolution: f64) -> Result<CloudWriter> {
+    pub fn create(
+        path: impl AsRef<Path>,
+        format: CloudFormat,
+        with_normals: bool,
+        resolution: f64,
+    ) -> Result<CloudWriter> {
         let digits = 4.0 - resolution.log10().floor();
         let decimals = if digits.is_finite() { digits.clamp(0.0, 17.0) as usize } else { 17 };
         let file = AtomicFile::create(path.as_ref())?;
@@ -284,7 +289,10 @@ mod tests {
     #[test]
     fn clouds_come_back() {
         let directory = tempfile::tempdir().expect("a directory");
-        let mut cloud = Cloud { points: (0..1000).map(|i| DVec3::new(f64::from(i) / 8.0, 1.5, -2.0)).collect(), normals: Vec::new() };
+        let mut cloud = Cloud {
+            points: (0..1000).map(|i| DVec3::new(f64::from(i) / 8.0, 1.5, -2.0)).collect(),
+            normals: Vec::new(),
+        };
         for normals in [0, 1000] {
             cloud.normals = vec![DVec3::new(0.0, 0.6, 0.8); normals];
             for name in ["a.xyz", "a.ply"] {
@@ -297,7 +305,9 @@ mod tests {
                 assert!(again.normals.iter().all(|n| n.distance(cloud.normals[0]) < 1e-6));
             }
         }
-        assert!(write_cloud(directory.path().join("a.stl"), &cloud).expect_err("no format").to_string().contains(".xyz"));
+        assert!(
+            write_cloud(directory.path().join("a.stl"), &cloud).expect_err("no format").to_string().contains(".xyz")
+        );
         let off = b"OFF\n3 0 0\n1 2 3\n4 5 6\n7 8 9\n";
         assert_eq!(read_cloud_bytes("a", off, Some(Format::Off)).expect("a mesh").points.len(), 3);
     }
