@@ -60,8 +60,8 @@ fn clouds_of_solids_come_back_within_two_cells() {
     }
 }
 
-/// Closed meshes of the collection, of which it is known that their walls are thicker than points are apart; with `ZMEND_CLOUDS=all` all closed ones, and
-/// then those that are not within two cells are listed.
+/// Closed meshes of the collection, of which it is known that their walls are thicker than points are apart; with `ZMEND_CLOUDS=all` all
+/// closed ones, and then those that are not within two cells are listed.
 #[test]
 fn clouds_of_real_solids_come_back_within_two_cells() {
     const SOME: [&str; 4] =
@@ -260,7 +260,8 @@ fn cells_fill_the_cube_and_know_their_side() {
         let [a, b] = [corners[0], corners[6]].map(|i| (cells.points[i as usize], cells.distances[i as usize]));
         assert!((a.1 - b.1).abs() <= a.0.distance(b.0) * 1.0001 + 0.5 * solid.frame.cell_size());
     }
-    // A face is that of one neighbour, or of four half as large: each node in the middle of a face of a cell belongs to cells one level finer.
+    // A face is that of one neighbour, or of four half as large: each node in the middle of a face of a cell belongs to cells one level
+    // finer.
     let only = CellOptions { outside: false, distances: false, ..CellOptions::default() };
     let body = solid.cells(Surface::DualContouring, &only, &Silent).expect("cells");
     assert_eq!(body.cells.len(), cells.count(Side::Inside) + cells.count(Side::Cut));
@@ -367,6 +368,9 @@ fn the_program_takes_points_and_makes_surfaces_of_them() {
     ] {
         folder.out(&format!("{args} --quiet"));
     }
+    let text = folder.out("surface cloud.ply ball.ply --method ball");
+    assert!(text.contains("boundary edges") && text.contains("manifold, oriented"), "{text}");
+    assert!(folder.error("surface cloud.ply b.ply --radius 3").contains("only a ball has a radius"));
     let json: serde_json::Value = serde_json::from_str(&folder.out("surface cloud.ply a.stl --json")).expect("JSON");
     assert_eq!((json["input"]["had_normals"].as_bool(), json["output"]["euler"].as_i64()), (Some(true), Some(0)));
     assert_eq!(

@@ -1,13 +1,14 @@
 //! The winding number of oriented points.
 //!
-//! Each point is a piece of the surface with an area and a normal, and its share of the solid angle, seen from a place, is that of a dipole (Barill,
-//! Dickson, Schmidt, Levin and Jacobson 2018): near 1 inside, near 0 outside, one half along the surface, and along what closes its holes. Far
-//! groups of dipoles are taken together, as a dipole and a quadrupole (Barnes and Hut 1986).
+//! Each point is a piece of the surface with an area and a normal, and its share of the solid angle, seen from a place, is that of a dipole
+//! (Barill, Dickson, Schmidt, Levin and Jacobson 2018): near 1 inside, near 0 outside, one half along the surface, and along what closes
+//! its holes. Far groups of dipoles are taken together, as a dipole and a quadrupole (Barnes and Hut 1986).
 //!
-//! A dipole is softened within half the root of its area, as if it were spread out there: near the surface the number then changes smoothly across
-//! it, and is one half on planes exactly.
+//! A dipole is softened within half the root of its area, as if it were spread out there: near the surface the number then changes smoothly
+//! across it, and is one half on planes exactly.
 //!
-//! Places are asked for in balls ([`Dipoles::seen_from`]): what is far of the ball becomes a polynomial of second degree, what is near a list.
+//! Places are asked for in balls ([`Dipoles::seen_from`]): what is far of the ball becomes a polynomial of second degree, what is near a
+//! list.
 //!
 //! Cost: some 90 bytes a point. 20 us a ball, and for places in balls of a few spacings less than 1 us each.
 
@@ -15,8 +16,8 @@ use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Groups so many times their radius away are taken together: the error is below one part in a hundred, half of it at the surface, where only signs
-/// count.
+/// Groups so many times their radius away are taken together: the error is below one part in a hundred, half of it at the surface, where
+/// only signs count.
 const FAR: f64 = 2.2;
 /// And so many times the radius of the ball that they are seen from: their field is a polynomial there.
 const BEYOND: f64 = 3.0;
@@ -151,8 +152,8 @@ struct Far {
 }
 
 impl Far {
-    /// Adds a group, whose middle is `way` off. With f = S.w / w^3 + tr M / w^3 - 3 w.Mw / w^5 for the way w, derivatives by the place are those by w,
-    /// with the other sign for the first ones. Those of the quadrupole are left out.
+    /// Adds a group, whose middle is `way` off. With f = S.w / w^3 + tr M / w^3 - 3 w.Mw / w^5 for the way w, derivatives by the place are
+    /// those by w, with the other sign for the first ones. Those of the quadrupole are left out.
     fn add(&mut self, way: DVec3, group: &Group) {
         let square = way.length_squared();
         let cube = 1.0 / (square * square.sqrt());

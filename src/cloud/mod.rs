@@ -4,8 +4,9 @@
 //! points -> normals -> winding number and planes -> Field on an octree -> signs and crossings -> surface
 //! ```
 //!
-//! [`Solid::from_cloud`](crate::Solid::from_cloud) makes a solid of a [`Cloud`], whose surface is closed, manifold and right side out because it is
-//! extracted from signs, as all surfaces are here. [`scatter`] goes the other way.
+//! [`Solid::from_cloud`](crate::Solid::from_cloud) makes a solid of a [`Cloud`], whose surface is closed, manifold and right side out
+//! because it is extracted from signs, as all surfaces are here. [`scatter`] goes the other way. [`pivot()`] interpolates: a
+//! ball rolls over the points and leaves triangles between them.
 //!
 //! | piece | what it does |
 //! |---|---|
@@ -36,6 +37,7 @@ mod dipoles;
 mod near;
 mod orient;
 mod outside;
+mod pivot;
 mod plane;
 mod scatter;
 mod shape;
@@ -44,6 +46,7 @@ mod surface;
 
 pub use dipoles::Dipoles;
 pub use near::{NONE, Near};
+pub use pivot::pivot;
 pub use plane::Plane;
 pub use scatter::{Pattern, ScatterOptions, scatter, scatter_into};
 pub use shape::Shape;
@@ -76,8 +79,8 @@ impl Cloud {
         bounds
     }
 
-    /// Without points that are not finite, and with each place once: the first point there stays. Without all normals if a point that stays has
-    /// none of a length. Returns how many points are gone. Sorts 32 bytes a point.
+    /// Without points that are not finite, and with each place once: the first point there stays. Without all normals if a point that stays
+    /// has none of a length. Returns how many points are gone. Sorts 32 bytes a point.
     pub fn clean(&mut self) -> usize {
         let before = self.points.len();
         let has_normals = self.has_normals();

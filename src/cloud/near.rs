@@ -1,7 +1,7 @@
 //! Which points are near: of each point of a cloud, or of any place.
 //!
-//! The points lie in the leaves of a [`LinearOctree`], a few in each, in the order of the curve. Places that follow each other are mostly near
-//! each other, so what is near is gathered for a whole cell at a time: one search of the tree answers for all points or places in it.
+//! The points lie in the leaves of a [`LinearOctree`], a few in each, in the order of the curve. Places that follow each other are mostly
+//! near each other, so what is near is gathered for a whole cell at a time: one search of the tree answers for all points or places in it.
 //!
 //! Cost: 8 bytes a point beside the tree. Some 2 us a point for its sixteen nearest.
 

@@ -1,9 +1,9 @@
 //! Which way normals point: as what infinity reaches says, and as neighbours say where that says nothing.
 //!
-//! Orientation is passed on from those points whose outer side is known for sure, along the graph of nearest points, always over the surest link
-//! (Hoppe et al. 1992 with their minimal spanning tree). Two points on an arc of a circle have normals that mirror each other in the plane between the
-//! points; so it is the mirrored normal that is compared, and not the normal itself: that is right at sharp edges, and across thin walls, where
-//! normals of neighbours are at right angles or opposite.
+//! Orientation is passed on from those points whose outer side is known for sure, along the graph of nearest points, always over the surest
+//! link (Hoppe et al. 1992 with their minimal spanning tree). Two points on an arc of a circle have normals that mirror each other in the
+//! plane between the points; so it is the mirrored normal that is compared, and not the normal itself: that is right at sharp edges, and
+//! across thin walls, where normals of neighbours are at right angles or opposite.
 
 use super::{NONE, outside};
 use crate::error::Result;
@@ -41,9 +41,9 @@ impl Ord for Link {
     }
 }
 
-/// Normals turned outward, and how many of them as infinity sees them. Too narrow a gap lets infinity in, and hardly any point is seen for sure; too
-/// wide a one closes what is open. So of several gaps, from narrow to wide, the first one is taken with which nearly as many are seen as with any.
-/// `nearest` lists `count` neighbours a point.
+/// Normals turned outward, and how many of them as infinity sees them. Too narrow a gap lets infinity in, and hardly any point is seen for
+/// sure; too wide a one closes what is open. So of several gaps, from narrow to wide, the first one is taken with which nearly as many are
+/// seen as with any. `nearest` lists `count` neighbours a point.
 ///
 /// # Errors
 /// `Cancelled`.

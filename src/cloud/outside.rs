@@ -1,9 +1,9 @@
 //! What infinity reaches without coming between points: on which side of each point that is.
 //!
-//! The points, on a lattice, are dilated until they are a wall without gaps; [`Regions`] are what is left between walls. From each point, the
-//! way along its normal and the way against it lead out of the wall into a region, soon or later. The outer region is outside. A wall that it touches
-//! has its points turned to it; other regions beside that wall are inside; walls within those are turned away from them, since
-//! there is a cavity behind; and so on inward.
+//! The points, on a lattice, are dilated until they are a wall without gaps; [`Regions`] are what is left between walls. From each point,
+//! the way along its normal and the way against it lead out of the wall into a region, soon or later. The outer region is outside. A wall
+//! that it touches has its points turned to it; other regions beside that wall are inside; walls within those are turned away from them,
+//! since there is a cavity behind; and so on inward.
 
 use crate::error::Result;
 use crate::geom::{Bounds, Frame};
@@ -17,7 +17,8 @@ use glam::DVec3;
 use hashbrown::HashMap;
 use rayon::prelude::*;
 
-/// Steps of dilation. A wall is as thick as five cells then; a hole is closed if the nearest point is at most [`CLOSES`] cells away everywhere in it.
+/// Steps of dilation. A wall is as thick as five cells then; a hole is closed if the nearest point is at most [`CLOSES`] cells away
+/// everywhere in it.
 const STEPS: usize = 2;
 /// See [`STEPS`]: two cells less half of one, since points are rounded to the lattice.
 const CLOSES: f64 = 1.5;
@@ -77,8 +78,8 @@ impl ClosedEdges for Wall {
 /// A way out of a wall: the region it leads to and how far that is, in half cells.
 type Exit = Option<(u32, u32)>;
 
-/// For each point how surely its normal points outward, from -1 to 1: 1 where only the way along it leads to the outside, less where both do
-/// but one is shorter, 0 where neither does. `gap` is the width up to which gaps between points are closed.
+/// For each point how surely its normal points outward, from -1 to 1: 1 where only the way along it leads to the outside, less where both
+/// do but one is shorter, 0 where neither does. `gap` is the width up to which gaps between points are closed.
 ///
 /// # Errors
 /// `Cancelled`, and when the points lie where no grid can be.
@@ -149,8 +150,8 @@ pub(super) fn votes(points: &[DVec3], normals: &[DVec3], gap: f64, progress: &dy
     Ok(seen.iter().map(vote).collect())
 }
 
-/// From which region each wall is reached first, going inward from the outer one, and whether that is outside. Which walls and regions touch is
-/// told by the points.
+/// From which region each wall is reached first, going inward from the outer one, and whether that is outside. Which walls and regions
+/// touch is told by the points.
 fn reached(seen: &[(u32, [Exit; 2])], regions: u32) -> HashMap<u32, (u32, bool), ahash::RandomState> {
     let mut touching: Vec<(u32, u32)> =
         seen.iter().flat_map(|(wall, exits)| exits.iter().flatten().map(|exit| (exit.0, *wall))).collect();

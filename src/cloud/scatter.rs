@@ -1,8 +1,8 @@
 //! Points on the surface of a mesh.
 //!
 //! *Poisson disk:* points by chance, none nearer to another than the spacing, and no place on the surface much farther from one. Darts are thrown
-//! (Cook 1986) at evenly spread places, in an order by chance, [`DARTS`] for each square of the spacing; a grid of cells as wide as the spacing says
-//! which points are near. Neither darts nor their order are stored.
+//! (Cook 1986) at evenly spread places, in an order by chance, [`DARTS`] for each square of the spacing; a grid of cells as wide as the
+//! spacing says which points are near. Neither darts nor their order are stored.
 //!
 //! *Regular:* rows of points over each triangle, from the corner opposite its shortest side on, as far apart as the spacing or nearer; points
 //! that come too near to others, at common sides or on small triangles, are left out.
@@ -42,8 +42,8 @@ pub enum Pattern {
 /// How to take points of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ScatterOptions {
-    /// How far points are from each other, in model units: the least distance of a Poisson disk pattern, the greatest along and between rows. Default
-    /// `None`: a hundredth of the diagonal of the mesh's box.
+    /// How far points are from each other, in model units: the least distance of a Poisson disk pattern, the greatest along and between
+    /// rows. Default `None`: a hundredth of the diagonal of the mesh's box.
     pub spacing: Option<f64>,
     /// How they are spread.
     pub pattern: Pattern,
@@ -66,12 +66,12 @@ pub fn scatter(mesh: &Mesh, options: &ScatterOptions, progress: &dyn Progress) -
     Ok(cloud)
 }
 
-/// Points on the faces of a mesh, and the unit normals of the faces there, passed to `take` as they are found; returns their number. Always the
-/// same ones for the same mesh and options. Faces without area, or with corners that are not finite, have none.
+/// Points on the faces of a mesh, and the unit normals of the faces there, passed to `take` as they are found; returns their number. Always
+/// the same ones for the same mesh and options. Faces without area, or with corners that are not finite, have none.
 ///
 /// # Errors
-/// When the spacing is no length above 0, or so small that there would be more than a billion points; when the mesh has no faces with an area;
-/// `Cancelled`, and what `take` returns.
+/// When the spacing is no length above 0, or so small that there would be more than a billion points; when the mesh has no faces with an
+/// area; `Cancelled`, and what `take` returns.
 pub fn scatter_into(
     mesh: &Mesh,
     options: &ScatterOptions,

@@ -19,7 +19,8 @@ const FILTERS: usize = 3;
 /// Normals 45 degrees apart count e^-2 in filters.
 const UNLIKE: f64 = 0.3;
 
-/// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to two.
+/// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to
+/// two.
 const GAPS: [f64; 4] = [1.6, 2.3, 3.2, 4.5];
 
 /// Spacing, normals and areas of the points of a cloud.
@@ -39,9 +40,9 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Looks at the `count` nearest of each point. Normals that the cloud has are kept; else they are those of planes through the nearest points,
-    /// turned to where infinity reaches without coming between points that are less than `gap` apart (of several widths the one with which most
-    /// is seen, when not given), or as their neighbours are.
+    /// Looks at the `count` nearest of each point. Normals that the cloud has are kept; else they are those of planes through the nearest
+    /// points, turned to where infinity reaches without coming between points that are less than `gap` apart (of several widths the one
+    /// with which most is seen, when not given), or as their neighbours are.
     ///
     /// # Errors
     /// `Cancelled`.
@@ -89,8 +90,8 @@ impl Shape {
     }
 }
 
-/// Each normal as the mean of those near it, which count less the more they differ: where planes were fitted across an edge, normals turn to one side
-/// (the bilateral filter of Tomasi and Manduchi 1998).
+/// Each normal as the mean of those near it, which count less the more they differ: where planes were fitted across an edge, normals turn
+/// to one side (the bilateral filter of Tomasi and Manduchi 1998).
 fn filtered<I: Iterator<Item = usize>>(normals: &[DVec3], nearest: impl Fn(usize) -> I + Sync) -> Vec<DVec3> {
     let mean = |i: usize| {
         let own = normals[i];

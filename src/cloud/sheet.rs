@@ -1,13 +1,13 @@
 //! The surface that points were taken of, as a function: negative inside.
 //!
-//! Two things are known of a place. The winding number of the points ([`Dipoles`]) says on which side it is, near points and far from them, and
-//! where holes are closed; but it is a sum over pieces, and rough. The planes of the points near by, each with its normal, blended by their distance
-//! (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points, and not where points of several
-//! sheets are about. So the planes are taken where they agree with the winding number, or where that is undecided, and where their
-//! normals are of one mind; and the winding number everywhere else.
+//! Two things are known of a place. The winding number of the points ([`Dipoles`]) says on which side it is, near points and far from them,
+//! and where holes are closed; but it is a sum over pieces, and rough. The planes of the points near by, each with its normal, blended by
+//! their distance (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points, and not where
+//! points of several sheets are about. So the planes are taken where they agree with the winding number, or where that is undecided, and
+//! where their normals are of one mind; and the winding number everywhere else.
 //!
-//! Where the surface crosses an edge of the lattice, points count less whose normals are unlike that of the nearest one (Oztireli, Guennebaud and Gross
-//! 2009 do so), so that sharp edges stay nearly as sharp as the points have them.
+//! Where the surface crosses an edge of the lattice, points count less whose normals are unlike that of the nearest one (Oztireli,
+//! Guennebaud and Gross 2009 do so), so that sharp edges stay nearly as sharp as the points have them.
 
 use super::dipoles::View;
 use super::{Cloud, Dipoles, Near, Shape};
@@ -68,7 +68,8 @@ impl Sheet {
         self.near.bytes() + self.normals.len() * (2 * size_of::<DVec3>() + 4 * size_of::<f64>())
     }
 
-    /// Calls `each` with the places and the points about them, in stretches of places so near to each other that the points are the same for all.
+    /// Calls `each` with the places and the points about them, in stretches of places so near to each other that the points are the same
+    /// for all.
     fn stretches<T>(&self, items: &[T], place: impl Fn(&T) -> DVec3, mut each: impl FnMut(&[T], &[u32], Bounds)) {
         let mut points = Vec::new();
         let mut start = 0;

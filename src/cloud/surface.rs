@@ -24,7 +24,8 @@ const NEIGHBOURS: std::ops::RangeInclusive<usize> = 4..=200;
 /// How to make a surface of points: `CloudOptions { depth: Some(9), ..CloudOptions::default() }`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudOptions {
-    /// log2 of the number of cells a side of the grid, 4 to 18. Default `None`: cells are as wide as points are apart, or up to twice as fine.
+    /// log2 of the number of cells a side of the grid, 4 to 18. Default `None`: cells are as wide as points are apart, or up to twice as
+    /// fine.
     pub depth: Option<u32>,
     /// Side of a cell in model units, instead of `depth`. Default `None`.
     pub cell: Option<f64>,
@@ -32,8 +33,8 @@ pub struct CloudOptions {
     pub scale: f64,
     /// How many neighbours of each point tell its normal and its area, 4 to 200. More are smoother, fewer are sharper. Default 12.
     pub neighbours: usize,
-    /// Where there are no normals: outside is what infinity reaches without passing between points that are less than this far apart, in model
-    /// units. Default `None`: four times as far as points are apart.
+    /// Where there are no normals: outside is what infinity reaches without passing between points that are less than this far apart, in
+    /// model units. Default `None`: four times as far as points are apart.
     pub gap: Option<f64>,
 }
 

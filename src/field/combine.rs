@@ -10,8 +10,8 @@ use glam::DVec3;
 
 /// Fields on the same root cube, each as fine as it is; the deeper frame is that of the result.
 ///
-/// Leaves are split where the surface passes through the crease between both fields, down to the frame's depth. So edges between two solids are as
-/// sharp as the finest cells, whatever leaves the fields have there.
+/// Leaves are split where the surface passes through the crease between both fields, down to the frame's depth. So edges between two solids
+/// are as sharp as the finest cells, whatever leaves the fields have there.
 impl Field {
     /// What is inside one or the other.
     ///
@@ -50,8 +50,8 @@ impl Field {
         self.combined(other, |a, b| (1.0 - share) * a + share * b, |_, _| 0.0, progress)
     }
 
-    /// The solid grown by a distance, or shrunk where it is negative, if the field is one of distances: values less that distance. The field
-    /// is as fine as it is there, which it may not be far from the old surface.
+    /// The solid grown by a distance, or shrunk where it is negative, if the field is one of distances: values less that distance. The
+    /// field is as fine as it is there, which it may not be far from the old surface.
     #[must_use]
     pub fn offset(&self, distance: f64) -> Field {
         let tree = self.nodes.tree().clone();

@@ -8,10 +8,10 @@
 //!
 //! # Surfaces
 //!
-//! [`Field::signed`] tells the signs of all finest lattice points, in bricks along the surface, and where it crosses the edges between them. Since the
-//! field is continuous across leaves of different size, so are the signs: there is nothing to be closed where small leaves meet large ones, and the
-//! contour has all the guarantees of signed octrees. It is as fine as the finest leaf everywhere. A field is a [`Volume`](crate::volume::Volume),
-//! too, for [`contour::volume`](crate::contour::volume).
+//! [`Field::signed`] tells the signs of all finest lattice points, in bricks along the surface, and where it crosses the edges between
+//! them. Since the field is continuous across leaves of different size, so are the signs: there is nothing to be closed where small leaves
+//! meet large ones, and the contour has all the guarantees of signed octrees. It is as fine as the finest leaf everywhere. A field is a
+//! [`Volume`](crate::volume::Volume), too, for [`contour::volume`](crate::contour::volume).
 //!
 //! ```
 //! use zmend::field::{Adapt, Field};

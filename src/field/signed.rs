@@ -194,8 +194,8 @@ impl Function for Field {
     }
 }
 
-/// The values at all lattice points of the frame's depth, 2^depth + 1 along each axis. [`Frame`](crate::geom::Frame) says where they are: at its
-/// origin, a cell apart. Each value costs a probe or a search.
+/// The values at all lattice points of the frame's depth, 2^depth + 1 along each axis. [`Frame`](crate::geom::Frame) says where they are:
+/// at its origin, a cell apart. Each value costs a probe or a search.
 impl Volume for Field {
     fn size(&self) -> [usize; 3] {
         [(1 << self.frame.depth()) + 1; 3]

@@ -1,8 +1,9 @@
 //! Clouds of points: XYZ text and PLY.
 //!
-//! XYZ is what scanners and spreadsheets write: a point a line, its coordinates first, with blanks, tabs, commas or semicolons between numbers, and
-//! comments behind `#`, `//` or `%`. What follows the coordinates are normals if there are three numbers at least and they have unit length, in all
-//! lines; else colours and the like, which are skipped. A first line with a single number, or of words, is a heading.
+//! XYZ is what scanners and spreadsheets write: a point a line, its coordinates first, with blanks, tabs, commas or semicolons between
+//! numbers, and comments behind `#`, `//` or `%`. What follows the coordinates are normals if there are three numbers at least and they
+//! have unit length, in all lines; else colours and the like, which are skipped. A first line with a single number, or of words, is a
+//! heading.
 
 use super::encode::{Out, Precision};
 use super::file::AtomicFile;
@@ -19,8 +20,8 @@ const UNIT: std::ops::Range<f64> = 0.95..1.05;
 /// Names of files that hold points as text.
 const TEXT: [&str; 7] = ["xyz", "xyzn", "pts", "asc", "txt", "csv", "dat"];
 
-/// Reads a cloud of points: of PLY files the vertices, with their normals if they have any; of other meshes all points; of everything else, a point a
-/// line.
+/// Reads a cloud of points: of PLY files the vertices, with their normals if they have any; of other meshes all points; of everything else,
+/// a point a line.
 ///
 /// # Errors
 /// When the file cannot be read or is malformed; the message names the line.
@@ -133,8 +134,8 @@ impl CloudFormat {
     }
 }
 
-/// A file that takes points one by one, and holds none. It has a temporary name until [`finish`](CloudWriter::finish), and is removed when dropped
-/// before.
+/// A file that takes points one by one, and holds none. It has a temporary name until [`finish`](CloudWriter::finish), and is removed when
+/// dropped before.
 pub struct CloudWriter {
     file: AtomicFile,
     format: CloudFormat,

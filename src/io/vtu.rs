@@ -1,7 +1,7 @@
 //! VTU: cells of simulations, for `ParaView` and other programs of the Visualization Toolkit.
 //!
-//! XML with numbers as text, or behind it as raw bytes. Cells have the data `level` and `side` (0 outside, 1 inside, 2 cut), points the data `distance`,
-//! if it is known.
+//! XML with numbers as text, or behind it as raw bytes. Cells have the data `level` and `side` (0 outside, 1 inside, 2 cut), points the
+//! data `distance`, if it is known.
 
 use super::encode::{Out, Precision};
 use super::file::AtomicFile;

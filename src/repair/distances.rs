@@ -69,8 +69,8 @@ impl Function for Distance<'_> {
 }
 
 impl Solid {
-    /// The signed distance from the solid's surface as a field on the octree's lattice, below 0 inside. The surface is the one that `surface` names.
-    /// Cuts and fills must be told by signs ([`told_by_signs`](Solid::told_by_signs)).
+    /// The signed distance from the solid's surface as a field on the octree's lattice, below 0 inside. The surface is the one that
+    /// `surface` names. Cuts and fills must be told by signs ([`told_by_signs`](Solid::told_by_signs)).
     ///
     /// Some 2 us a node, and more far from the surface.
     ///
@@ -110,8 +110,8 @@ impl Solid {
         Ok(cells)
     }
 
-    /// The signed distance at all lattice points of a cube about the solid, as a volume of 32-bit numbers: every `2^(depth - level)`th point of the
-    /// octree's lattice, 2^level + 1 along each axis.
+    /// The signed distance at all lattice points of a cube about the solid, as a volume of 32-bit numbers: every `2^(depth - level)`th
+    /// point of the octree's lattice, 2^level + 1 along each axis.
     ///
     /// # Errors
     /// When the level is 0 or deeper than the octree, or the volume too large, and as [`distance_field`](Solid::distance_field).

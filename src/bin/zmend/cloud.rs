@@ -1,14 +1,14 @@
 //! `zmend surface` and `zmend points`: from points to surfaces and back.
 
-use crate::args::{CloudArgs, Limit, PointsArgs};
+use crate::args::{CloudArgs, CloudMethodArg, Limit, PointsArgs};
 use crate::bars::Bars;
 use crate::print::Table;
 use crate::solid::{self, Job, Work};
-use crate::{goal, interrupt, print, units};
+use crate::{convert, goal, interrupt, memory, print, units};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::ExitCode;
-use zmend::cloud::{CloudReport, ScatterOptions, scatter_into};
+use zmend::cloud::{CloudReport, ScatterOptions, pivot, scatter_into};
 use zmend::io::{self, CloudFormat, CloudWriter};
 use zmend::mesh::Bounds;
 use zmend::{Error, Place, Result};
@@ -17,6 +17,13 @@ pub(crate) fn surface(args: &CloudArgs) -> Result<ExitCode> {
     let CloudArgs { input, out, write, tell, .. } = args;
     let to = goal::format(out, write.format.map(Into::into))?;
     goal::check(out, &[input], write.force)?;
+    if args.method == CloudMethodArg::Ball {
+        return ball(args);
+    }
+    if !args.radius.is_empty() {
+        let problem = "only a ball has a radius";
+        return Err(Error::setting("radius", problem, "say --method ball, or leave this option away"));
+    }
     let work = Work {
         options: args.options(),
         given: None,
@@ -28,6 +35,47 @@ pub(crate) fn surface(args: &CloudArgs) -> Result<ExitCode> {
     };
     let topology = args.handles.options();
     solid::run(&Job { input, goal: out, to, work, topology, volume: None, skeleton: None, patches: None })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Triangles between points.
+fn ball(args: &CloudArgs) -> Result<ExitCode> {
+    let CloudArgs { input, out, write, tell, .. } = args;
+    goal::mesh_format(out)?;
+    let bars = Bars::new(!tell.quiet && !tell.json).within(memory::limit(args.max_memory)?);
+    let mut points = io::read_cloud(input)?;
+    if args.no_normals {
+        points.normals.clear();
+    }
+    let mesh = pivot(&points, &args.radius, &bars)?;
+    drop(bars);
+    let bytes = convert::write(out, &mesh, write.ascii)?;
+    if tell.quiet {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let report = mesh.report();
+    if tell.json {
+        let all = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "input": { "path": input.display().to_string(), "points": points.points.len(), "had_normals": points.has_normals() },
+            "output": {
+                "path": out.display().to_string(),
+                "bytes": bytes,
+                "vertices": mesh.points.len(),
+                "faces": mesh.faces.len(),
+                "boundary_edges": report.boundary_edges,
+                "holes": report.boundary_loops,
+            },
+        });
+        print::out(&format!("{all}\n"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut table = Table::default();
+    table.line("points", &[Some(units::count(points.points.len() as u64))]);
+    table.line("boundary edges", &[Some(units::count(report.boundary_edges))]);
+    table.line("holes", &[Some(units::count(report.boundary_loops))]);
+    let remedy = if report.boundary_edges > 0 { "; `zmend repair` closes it" } else { "" };
+    print::out(&format!("{}\n\n{table}\nmanifold, oriented{remedy}\n", convert::told(out, &mesh, bytes)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -18,6 +18,7 @@ Examples:
   zmend surface points.csv part.stl --surface dc        sharp edges and corners
   zmend surface noisy.xyz smooth.ply --neighbours 40
   zmend surface scan.xyz scan.stl --gap 5 --keep largest
+  zmend surface clean.ply mesh.ply --method ball --radius 0.4,0.8    triangles between the points
   zmend points part.stl cloud.xyz --spacing 0.5 && zmend surface cloud.xyz again.stl
 
 Points come from XYZ text (a point a line: x y z, or x y z and a unit normal; colours and the like behind are skipped), from PLY (vertices, and their \
@@ -46,8 +47,8 @@ pub(crate) struct CloudArgs {
     /// How many nearest points tell the normal and the share of each: more are smoother, fewer are sharper.
     #[arg(short, long, value_name = "N", default_value_t = 12, value_parser = value_parser!(u16).range(4..=200), help_heading = "Points")]
     neighbours: u16,
-    /// Without normals: infinity does not pass between points less than this far apart, in model units. Four times as far as points are apart when not
-    /// given.
+    /// Without normals: infinity does not pass between points less than this far apart, in model units. Four times as far as points are
+    /// apart when not given.
     #[arg(long, value_name = "WIDTH", value_parser = width, allow_negative_numbers = true, help_heading = "Points")]
     gap: Option<f64>,
     /// Do as if the points had no normals.
@@ -59,6 +60,13 @@ pub(crate) struct CloudArgs {
     /// Fill cavities: what is outside, but cannot be reached from there.
     #[arg(long, help_heading = "Surface")]
     pub(crate) drop_cavities: bool,
+    /// How the surface is made.
+    #[arg(short, long, value_name = "METHOD", value_enum, default_value_t = CloudMethodArg::Octree, help_heading = "Surface")]
+    pub(crate) method: CloudMethodArg,
+    /// With --method ball: radius of the ball in model units; several are rolled one after the other. When not given, as wide as points are
+    /// apart, and larger ones after that.
+    #[arg(long, value_name = "R", value_parser = width, value_delimiter = ',', help_heading = "Surface")]
+    pub(crate) radius: Vec<f64>,
     /// Kind of surface.
     #[arg(short, long, value_name = "KIND", value_enum, default_value_t = SurfaceArg::Mc, help_heading = "Surface")]
     surface: SurfaceArg,
@@ -92,6 +100,16 @@ impl CloudArgs {
             ..Options::default()
         }
     }
+}
+
+/// Ways from points to surfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CloudMethodArg {
+    /// A level set on an octree: smooths noise, closes holes; always closed, manifold, oriented.
+    Octree,
+    /// A ball that rolls over the points: triangles between the points themselves; manifold, with holes where points are too far apart. Of
+    /// the other options only --no-normals and those of the output apply.
+    Ball,
 }
 
 /// Take points of the surface of a mesh.

@@ -9,7 +9,7 @@ mod values;
 mod volume;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use fields::{CloudArgs, OctmeshArgs, PointsArgs};
+pub(crate) use fields::{CloudArgs, CloudMethodArg, OctmeshArgs, PointsArgs};
 pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
