@@ -12,6 +12,7 @@
 //!
 //! Cost: some 90 bytes a point. 20 us a ball, and for places in balls of a few spacings less than 1 us each.
 
+use crate::geom::Bounds;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -39,6 +40,8 @@ struct Group {
 /// Dipoles under a tree.
 #[derive(Debug, Clone)]
 pub struct Dipoles {
+    /// The length in which all others are told: half of the cloud's, so that 32-bit numbers hold squares and cubes whatever the model's unit is.
+    unit: f64,
     points: Vec<DVec3>,
     /// Normals times areas.
     dipoles: Vec<DVec3>,
@@ -56,9 +59,19 @@ impl Dipoles {
     pub fn new(points: &[DVec3], normals: &[DVec3], areas: &[f64]) -> Dipoles {
         assert!(points.len() == normals.len() && points.len() == areas.len(), "a normal and an area for each point");
         let height = points.len().div_ceil(LEAF).max(1).next_power_of_two().trailing_zeros();
-        let dipoles = normals.iter().zip(areas).map(|(&n, &area)| n * area).collect();
-        let soft = areas.iter().map(|area| SOFT * area).collect();
-        let mut tree = Dipoles { points: points.to_vec(), dipoles, soft, groups: Vec::new(), height };
+        let mut bounds = Bounds::EMPTY;
+        points.iter().for_each(|&p| bounds.add(p));
+        let half = 0.5 * bounds.extent().max_element();
+        let unit = if half.is_normal() && half > 0.0 { half } else { 1.0 };
+        let in_units = |area: f64| area / unit / unit;
+        let mut tree = Dipoles {
+            unit,
+            points: points.iter().map(|&p| p / unit).collect(),
+            dipoles: normals.iter().zip(areas).map(|(&n, &area)| n * in_units(area)).collect(),
+            soft: areas.iter().map(|&area| SOFT * in_units(area)).collect(),
+            groups: Vec::new(),
+            height,
+        };
         tree.groups =
             (0..2usize << height).into_par_iter().with_min_len(64).map(|node| tree.group(node.max(1))).collect();
         tree
@@ -97,7 +110,8 @@ impl Dipoles {
 
     /// What is needed for places in a ball.
     pub fn seen_from(&self, middle: DVec3, radius: f64) -> View {
-        let mut view = View { middle, ..View::default() };
+        let (middle, radius) = (middle / self.unit, radius / self.unit);
+        let mut view = View { unit: self.unit, middle, far: Far::default(), near: NearDipoles::default() };
         if self.points.is_empty() {
             return view;
         }
@@ -128,8 +142,9 @@ impl Dipoles {
 }
 
 /// Dipoles as seen from within a ball.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct View {
+    unit: f64,
     middle: DVec3,
     far: Far,
     near: NearDipoles,
@@ -138,7 +153,7 @@ pub struct View {
 impl View {
     /// The winding number at a place in the ball.
     pub fn winding(&self, place: DVec3) -> f64 {
-        let way = place - self.middle;
+        let way = place / self.unit - self.middle;
         (self.far.at(way) + f64::from(self.near.at(way.as_vec3()))) / (4.0 * PI)
     }
 }

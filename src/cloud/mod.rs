@@ -44,7 +44,7 @@ mod shape;
 mod sheet;
 mod surface;
 
-pub use dipoles::Dipoles;
+pub use dipoles::{Dipoles, View};
 pub use near::{NONE, Near};
 pub use pivot::pivot;
 pub use plane::Plane;

@@ -6,16 +6,24 @@
 //! Cost: 8 bytes a point beside the tree. Some 2 us a point for its sixteen nearest.
 
 use super::Cloud;
+use crate::error::{Error, Result};
 use crate::geom::Bounds;
 use crate::grid::Key;
 use crate::grid::key::SIDE;
 use crate::octree::LinearOctree;
+use crate::progress::{Progress, check};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Most points of a leaf.
 const MOST: usize = 12;
+
+/// More points than these in one cell of the lattice are refused where all of them are searched for.
+const CROWD: usize = 4096;
+
+/// Part of the points on each side, along each axis, that may be far off.
+const FAR_OFF: f64 = 0.01;
 
 /// The number of a point that there is not.
 pub const NONE: u32 = u32::MAX;
@@ -32,18 +40,16 @@ pub struct Near {
 }
 
 impl Near {
-    /// Puts the points of a cloud into the order of the curve, and finds them there.
+    /// Puts the points of a cloud into the order of the curve, and finds them there. The lattice lies over most of the points; the few that are far off
+    /// do not make it coarse.
     ///
     /// # Panics
     /// If there are 2^32 points or more, or one is not finite.
     pub fn sorted(cloud: &Cloud) -> (Cloud, Near) {
-        let bounds = cloud.bounds();
-        let extent = if bounds.is_empty() { 0.0 } else { bounds.extent().max_element() };
-        // A quarter of the lattice is left round the points, for places beside them.
-        let size = if extent > 0.0 { 2.0 * extent } else { 1.0 };
-        let centre = if bounds.is_empty() { DVec3::ZERO } else { bounds.center() };
+        let (centre, size) = most_of(&cloud.points);
         let (origin, scale) = (centre - 0.5 * size, f64::from(SIDE) / size);
-        let on_lattice = |p: &DVec3| ((*p - origin) * scale).to_array().map(|c| c as u32);
+        // Those beyond lie in the outermost cells.
+        let on_lattice = |p: &DVec3| ((*p - origin) * scale).to_array().map(|c| (c as u32).min(SIDE));
         let places: Vec<[u32; 3]> = cloud.points.par_iter().map(on_lattice).collect();
         let (tree, order) = LinearOctree::of_points(&places, MOST, crate::grid::key::MAX_LEVEL);
         assert_eq!(order.len(), cloud.points.len(), "all points are finite");
@@ -56,6 +62,12 @@ impl Near {
     /// The points, in their order.
     pub fn points(&self) -> &[DVec3] {
         &self.points
+    }
+
+    /// The most points that no search can tell apart by place: 12, unless many are so near to each other, beside the extent of most of the cloud, that
+    /// the lattice has one cell for them. Searches look at all of them.
+    pub fn crowd(&self) -> usize {
+        self.tree.iter().map(|(_, range)| range.len()).max().unwrap_or(0)
     }
 
     /// Bytes held.
@@ -83,12 +95,28 @@ impl Near {
         }
     }
 
+    /// Refuses clouds in which searches would take for ever.
+    ///
+    /// # Errors
+    /// When too many points lie in one place, beside the extent of the cloud.
+    pub(super) fn check(&self) -> Result<()> {
+        let crowd = self.crowd();
+        if crowd <= CROWD {
+            return Ok(());
+        }
+        let problem = format!("{crowd} points lie within a 150,000th of the extent of the cloud");
+        Err(Error::setting("input", problem, "leave out points that are far off, or some of those that lie so near"))
+    }
+
     /// For each point, the `count` others that are nearest to it, nearest first, of equal ones the lower number first: `count` numbers a
     /// point, [`NONE`] where there are not as many points. On all threads.
     ///
+    /// # Errors
+    /// `Cancelled`.
+    ///
     /// # Panics
     /// When `count` is 0.
-    pub fn nearest(&self, count: usize) -> Vec<u32> {
+    pub fn nearest(&self, count: usize, progress: &dyn Progress) -> Result<Vec<u32>> {
         let leaves: Vec<(Key, Range<u32>)> = self
             .tree
             .iter_z()
@@ -104,9 +132,11 @@ impl Near {
             jobs.push((leaf, range, own));
         }
         jobs.into_par_iter().with_min_len(16).for_each_init(Vec::new, |scratch, (leaf, range, found)| {
-            self.nearest_of_leaf(leaf, range, count, found, scratch);
+            if !progress.is_cancelled() {
+                self.nearest_of_leaf(leaf, range, count, found, scratch);
+            }
         });
-        found
+        check(progress).map(|()| found)
     }
 
     /// Those of the points of a leaf.
@@ -155,10 +185,43 @@ impl Near {
     }
 }
 
+/// A cube that holds most of some points, with room about them: its middle and side.
+fn most_of(points: &[DVec3]) -> (DVec3, f64) {
+    if points.is_empty() {
+        return (DVec3::ZERO, 1.0);
+    }
+    let far_off = (points.len() as f64 * FAR_OFF) as usize;
+    let ends = [0, 1, 2].map(|axis| {
+        let mut along: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        [far_off, points.len() - 1 - far_off].map(|n| *along.select_nth_unstable_by(n, f64::total_cmp).1)
+    });
+    let [low, high] = [0, 1].map(|end| DVec3::from_array(ends.map(|ends| ends[end])));
+    let extent = (high - low).max_element();
+    // As much room on both sides as the points take.
+    (low + 0.5 * (high - low), if extent > 0.0 { 3.0 * extent } else { 1.0 })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::Silent;
     use proptest::prelude::*;
+
+    #[test]
+    fn few_that_are_far_off_do_no_harm_and_crowds_are_told() {
+        let number = |i: u32| f64::from(i.wrapping_mul(0x9e37_79b9) >> 8) / f64::from(1 << 24);
+        let place = |i: u32| DVec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));
+        let mut points: Vec<DVec3> = (0..6000).map(place).collect();
+        points.push(DVec3::splat(1e9));
+        let (_, near) = Near::sorted(&Cloud { points: points.clone(), normals: Vec::new() });
+        assert!(near.crowd() <= MOST && near.check().is_ok());
+        let mut found = Vec::new();
+        near.within(DVec3::splat(1e9), 1.0, |i, _| found.push(i));
+        assert_eq!(found.len(), 1);
+        points.extend((0..6000).map(|i| DVec3::splat(1e9 + f64::from(i))));
+        let (_, near) = Near::sorted(&Cloud { points, normals: Vec::new() });
+        assert!(near.check().expect_err("two crowds").to_string().contains("points lie within a 150,000th"));
+    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
@@ -167,7 +230,7 @@ mod tests {
             // Many coincide, and many are equally far.
             let cloud = Cloud { points: points.iter().map(|p| DVec3::from_array(p.map(f64::from)) * 0.3).collect(), normals: Vec::new() };
             let (cloud, near) = Near::sorted(&cloud);
-            let found = near.nearest(count);
+            let found = near.nearest(count, &Silent).expect("not cancelled");
             for (i, &p) in cloud.points.iter().enumerate() {
                 let mut all: Vec<(f64, u32)> =
                     cloud.points.iter().zip(0..).filter(|&(_, j)| j != i as u32).map(|(q, j)| (q.distance_squared(p), j)).collect();

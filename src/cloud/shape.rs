@@ -45,10 +45,11 @@ impl Shape {
     /// with which most is seen, when not given), or as their neighbours are.
     ///
     /// # Errors
-    /// `Cancelled`.
+    /// When too many points lie in one place, beside the extent of the cloud; `Cancelled`.
     pub fn of(cloud: &Cloud, near: &Near, count: usize, gap: Option<f64>, progress: &dyn Progress) -> Result<Shape> {
         check(progress)?;
-        let nearest = near.nearest(count);
+        near.check()?;
+        let nearest = near.nearest(count, progress)?;
         check(progress)?;
         let of =
             |i: usize| nearest[count * i..][..count].iter().copied().take_while(|&j| j != NONE).map(|j| j as usize);

@@ -9,8 +9,7 @@
 //! Where the surface crosses an edge of the lattice, points count less whose normals are unlike that of the nearest one (Oztireli,
 //! Guennebaud and Gross 2009 do so), so that sharp edges stay nearly as sharp as the points have them.
 
-use super::dipoles::View;
-use super::{Cloud, Dipoles, Near, Shape};
+use super::{Cloud, Dipoles, Near, Shape, View};
 use crate::field::{Edge, Function, Zero};
 use crate::geom::Bounds;
 use glam::DVec3;

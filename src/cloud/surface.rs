@@ -84,6 +84,8 @@ impl Field {
             let problem = format!("{} points are not enough for a surface", cleaned.points.len());
             return Err(Error::setting("input", problem, "give four at least, in different places"));
         }
+        // Whether there is a grid for such a cloud, before any work.
+        Frame::fit(&cleaned.bounds(), COARSEST + 1, options.scale)?;
         // Points, their order, neighbours, normals, areas, dipoles.
         progress.hold(cleaned.points.len() as u64 * (300 + 4 * options.neighbours as u64))?;
         let had_normals = cleaned.has_normals();

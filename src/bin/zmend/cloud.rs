@@ -13,6 +13,9 @@ use zmend::io::{self, CloudFormat, CloudWriter};
 use zmend::mesh::Bounds;
 use zmend::{Error, Place, Result};
 
+/// Cells so many times as wide as points are apart lose what the points show.
+const COARSE: f64 = 4.0;
+
 pub(crate) fn surface(args: &CloudArgs) -> Result<ExitCode> {
     let CloudArgs { input, out, write, tell, .. } = args;
     let to = goal::format(out, write.format.map(Into::into))?;
@@ -105,8 +108,14 @@ pub(crate) fn as_json(report: &CloudReport, path: &Path) -> Value {
 }
 
 /// What is to be known of a cloud.
-pub(crate) fn warnings(report: &CloudReport) -> Vec<String> {
+pub(crate) fn warnings(report: &CloudReport, cell: f64) -> Vec<String> {
     let mut warnings = Vec::new();
+    if cell > COARSE * report.spacing {
+        let [cell, spacing] = [cell, report.spacing].map(units::real);
+        warnings.push(format!(
+            "cells of {cell} are much wider than points are apart, {spacing}: --depth or --cell makes them finer"
+        ));
+    }
     if report.dropped > 0 {
         let dropped = units::counted(report.dropped as u64, "point", "points");
         warnings.push(format!("{dropped} lay where others do, or nowhere, and were left out"));

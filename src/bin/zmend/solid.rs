@@ -88,7 +88,8 @@ pub(crate) enum Source {
     Octree(OctreeInfo),
     Mesh(Box<RepairReport>),
     Volume(Box<Told>),
-    Cloud(CloudReport),
+    /// And the side of its cells.
+    Cloud(CloudReport, f64),
 }
 
 /// The time that each piece of work took.
@@ -153,7 +154,8 @@ fn open_cloud(path: &Path, args: &CloudArgs, bars: &Bars) -> Result<(Solid, Sour
         solid = Solid::new(octree, solid.frame);
     }
     let times = vec![("read", read), (Stage::Sign.name(), start.elapsed().saturating_sub(read))];
-    Ok((solid, Source::Cloud(report), times))
+    let source = Source::Cloud(report, solid.frame.cell_size());
+    Ok((solid, source, times))
 }
 
 pub(crate) fn run(job: &Job<'_>) -> Result<()> {
@@ -252,7 +254,7 @@ impl Source {
             }
             Source::Octree(info) => json::octree_file(info),
             Source::Volume(told) => told.json(),
-            Source::Cloud(report) => cloud::as_json(report, path),
+            Source::Cloud(report, _) => cloud::as_json(report, path),
         }
     }
 
@@ -261,7 +263,7 @@ impl Source {
         match self {
             Source::Mesh(report) => report.warnings.iter().map(ToString::to_string).collect(),
             Source::Volume(told) => told.warnings(),
-            Source::Cloud(report) => cloud::warnings(report),
+            Source::Cloud(report, cell) => cloud::warnings(report, *cell),
             Source::Octree(info) => {
                 let ignored = units::counted(info.trailing_bytes, "byte", "bytes");
                 let missing = units::counted(info.missing_samples, "crossed edge", "crossed edges");
@@ -327,7 +329,7 @@ impl Outcome<'_> {
             told.lines(&mut table);
             level = format!(", what is {}", told.level_words());
         }
-        if let Source::Cloud(report) = &self.source {
+        if let Source::Cloud(report, _) = &self.source {
             cloud::lines(report, &mut table);
         }
         table.line("surface cells", &[Some(units::count(self.surface_cells()))]);
