@@ -195,3 +195,31 @@ fn two_gigabytes_are_streamed() {
     let [(small, _), (large, of_large)] = [450, 4500].map(|n| peak_of_ball(n, 9, 500_000));
     assert!(of_large > 2_000_000_000 && large < small + 10_000_000, "{small}, {large}");
 }
+
+/// Peak memory of the extraction of a ball from a volume of so many samples along each axis, one byte each.
+fn peak_of_volume(side: usize) -> u64 {
+    let folder = tempfile::tempdir().unwrap();
+    let from_middle = |c: usize| (c as f64 - 0.5 * (side - 1) as f64) / side as f64;
+    let sample = |i: usize| {
+        let squares = [i % side, i / side % side, i / (side * side)].map(|c| from_middle(c).powi(2));
+        (128.0 + 1000.0 * (0.4 - squares.iter().sum::<f64>().sqrt())) as u8
+    };
+    fs::write(folder.path().join("ball.raw"), (0..side.pow(3)).map(sample).collect::<Vec<u8>>()).unwrap();
+    let args =
+        format!("extract ball.raw out.ply --iso 128 --raw {side}x{side}x{side}:u8 --threads 2 --json --report brief");
+    let output = run(folder.path(), &args);
+    assert!(output.status.success(), "{}", error(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    json["peak_memory_bytes"].as_u64().unwrap()
+}
+
+/// Beside the volume, extraction holds what it knows of the surface and the signs of few slices: here some 65 bytes for each sample of a slice, of
+/// which the ball has six triangles.
+#[test]
+fn extraction_takes_the_memory_of_a_slice() {
+    let side = 320;
+    let beside = peak_of_volume(side).saturating_sub(peak_of_volume(8) + side.pow(3) as u64);
+    let of_slice = (side * side) as u64;
+    println!("{beside} bytes, {} a sample of a slice", beside / of_slice);
+    assert!(beside < 110 * of_slice, "{beside}");
+}

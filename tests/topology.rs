@@ -402,6 +402,45 @@ fn repair_makes_real_noise_simple_in_one_command() {
 }
 
 #[test]
+fn a_sketch_says_what_the_topology_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ring = solid(6, |p| torus(p, MIDDLE, DVec3::Z, 0.3, 0.1));
+    io::write_sof(folder.join("ring.sof"), ring.signed(), &Silent).unwrap();
+    let on_circle = |i: u32| {
+        MIDDLE + 0.3 * DVec3::new(f64::cos(TAU * f64::from(i) / 16.0), f64::sin(TAU * f64::from(i) / 16.0), 0.0)
+    };
+    let points: String = (0..16).map(on_circle).map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
+    let circle: String = (0..16).map(|i| format!("l {} {}\n", i + 1, (i + 1) % 16 + 1)).collect();
+    for (name, lines, genus, cuts) in [
+        ("dot.obj", "l 1 2\nl 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16\n".to_owned(), 0, 1),
+        ("circle.axs", format!("{circle}s 0\no\n"), 1, 0),
+        ("theta.obj", format!("{circle}l 1 9\n"), 2, 0),
+    ] {
+        std::fs::write(folder.join(name), format!("{points}{lines}")).unwrap();
+        for surface in ["mc", "dc", "quads"] {
+            let told = json(folder, &format!("topology ring.sof out.ply --sketch {name} --surface {surface} --force"));
+            assert_eq!((&told["output"]["genus"], &told["output"]["solid"]), (&genus.into(), &true.into()), "{name}");
+            assert_eq!(told["topology"]["cuts"].as_array().unwrap().len(), cuts, "{name}");
+            assert_eq!(told["topology"]["changed_cells"] == 0, name == "circle.axs");
+        }
+    }
+    std::fs::remove_file(folder.join("out.ply")).unwrap();
+    std::fs::write(folder.join("far.axs"), "v 0.5 0.5 0.5\nv 7 7 7\nl 1 2\n").unwrap();
+    std::fs::write(folder.join("beside.axs"), "v 0.5 0.5 0.5\nv 0.52 0.5 0.5\nl 1 2\n").unwrap();
+    for (args, problem) in [
+        ("--sketch far.axs", "point 1, at (448, 448, 448) in cells, does not lie within the grid of 64"),
+        ("--sketch beside.axs", "no line of it comes into the solid"),
+        ("--sketch ring.sof", "no points"),
+        ("--sketch dot.obj --cut 1", "cannot be used with"),
+    ] {
+        let (ok, out, err) = run(folder, &format!("topology ring.sof out.ply {args}"));
+        assert!(!ok && err.contains(problem), "{args}: {out}{err}");
+        assert!(!folder.join("out.ply").exists(), "{args}");
+    }
+}
+
+#[test]
 fn what_makes_no_sense_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -291,8 +291,47 @@ fn the_program_extracts_labels_that_fit_together() {
     assert!(common >= 2 * (ny - 1) * (nz - 1), "{common} of {}", of_one.len());
     let error = shell.run("extract labels.mha a.ply --label 3").expect_err("nothing has this label");
     assert!(error.contains("label: no sample is 3; values go from 0 to 6"), "{error}");
-    let error = shell.run("extract labels.mha a.ply --label 6 --genus 0").expect_err("not together");
-    assert!(error.contains("label: labels become meshes") && !shell.path("a.ply").exists(), "{error}");
+    for (args, words) in [
+        ("extract labels.mha a.ply --label 6 --method dc", "method: surfaces of labels fit together by surface nets"),
+        ("extract labels.mha a.ply --label 6 --cell 0.5", "cell: numbers of materials cannot be interpolated"),
+        ("extract labels.mha a.ply --label 3 --genus 0", "label: no sample is 3; values go from 0 to 6"),
+    ] {
+        let error = shell.run(args).expect_err(args);
+        assert!(error.contains(words) && !shell.path("a.ply").exists(), "{args}: {error}");
+    }
+}
+
+/// A material goes through topology repair as a field of 1 and 0: here two rings, of which the smaller one is dropped and the other one filled or
+/// cut; also sampled anew, and by `zmend topology`.
+#[test]
+fn topology_of_labels_is_repaired() {
+    let shell = Shell::new();
+    let material = |[x, y, z]: [usize; 3]| {
+        let is_ring = |low: usize, high: usize, wide: usize| {
+            let is_within = |low: usize, high: usize| (low..high).contains(&x) && (low..high).contains(&y);
+            is_within(low, high) && !is_within(low + wide, high - wide)
+        };
+        let is_of_it = (2..5).contains(&z) && (is_ring(2, 14, 3) || is_ring(20, 25, 2));
+        if is_of_it { 7 } else { u8::from(x > 10) * 9 }
+    };
+    let [nx, ny, nz] = [27, 27, 7];
+    let voxels = (0..nx * ny * nz).map(|i| material([i % nx, i / nx % ny, i / (nx * ny)])).collect();
+    let image = Image::new([nx, ny, nz], Placement::default(), Voxels::U8(voxels)).unwrap();
+    write_volume(shell.path("rings.mha"), &image, &Silent).unwrap();
+    let plain = shell.json("extract rings.mha rings.ply --label 7");
+    assert_eq!((&plain["output"]["components"], &plain["output"]["genus"]), (&2.into(), &2.into()), "{plain}");
+    for (args, genus) in
+        [("--drop-islands 80", 1), ("--drop-islands 80 --genus 0", 0), ("--drop-islands 80 --cell 0.5", 1)]
+    {
+        let told = shell.json(&format!("extract rings.mha one.ply --label 7 --force {args}"));
+        assert_eq!((&told["output"]["components"], &told["output"]["solid"]), (&1.into(), &true.into()), "{told}");
+        assert_eq!(told["output"]["genus"], genus, "{args}: {told}");
+        let volume = told["output"]["volume"].as_f64().unwrap();
+        // 324 samples, whose edges nets cut off.
+        assert!((265.0..324.0).contains(&volume), "{args}: {volume}");
+    }
+    let told = shell.json("topology rings.mha --list --label 7");
+    assert_eq!((&told["topology"]["components"], &told["topology"]["handles"]), (&2.into(), &2.into()), "{told}");
 }
 
 #[test]

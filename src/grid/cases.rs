@@ -37,6 +37,15 @@ pub struct Case {
     pub sheets: Sheets,
 }
 
+impl Case {
+    /// Whether its two cycles bound a tunnel: then its surface is a band between them, not a disc in each.
+    pub fn has_tunnel(&self) -> bool {
+        // Discs have two triangles less than corners, a band has as many.
+        let corners: usize = self.cycles.iter().map(Vec::len).sum();
+        self.triangles.len() + 2 * self.cycles.len() != corners
+    }
+}
+
 /// The sheets of a case and the vertices that stand for them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Sheets {

@@ -21,7 +21,7 @@
 //! go to VTU files by [`write_vtu`].
 //!
 //! Signed octrees in SOF, SOG and DCF files ([`OctreeFormat`]) come and go by [`read_octree`], [`write_sof`], [`write_sog`] and
-//! [`write_dcf`]. Volumes have a [module](volume) of their own.
+//! [`write_dcf`]. Volumes have a [module](volume) of their own, and so have [sketches](sketch).
 //!
 //! ```
 //! use zmend::io;
@@ -49,6 +49,7 @@ mod points;
 #[cfg(any(feature = "gltf", feature = "3mf"))]
 mod scene;
 pub mod skeleton;
+pub mod sketch;
 pub mod skt;
 mod stl;
 mod text;

@@ -1,6 +1,6 @@
 //! Meshes that pass by: sources that yield triangles without holding them, sinks that take a mesh as it is made.
 
-use super::Mesh;
+use super::{Mesh, Polygons};
 use crate::error::Result;
 use crate::geom::Bounds;
 use glam::DVec3;
@@ -73,14 +73,19 @@ pub trait MeshSink {
     fn faces(&mut self, arity: usize, corners: &[u32]) -> Result<()>;
 }
 
+/// What the mesh held before is replaced.
 impl MeshSink for Mesh {
     fn bytes_for(&self, sizes: MeshSizes) -> u64 {
         let index = size_of::<u32>() as u64;
-        sizes.points * size_of::<DVec3>() as u64 + (sizes.faces + sizes.corners) * index
+        // Polygons have three corners or more: these are all triangles, whose ends are not listed.
+        let ends = if sizes.corners == 3 * sizes.faces { 0 } else { sizes.faces };
+        sizes.points * size_of::<DVec3>() as u64 + (ends + sizes.corners) * index
     }
 
     fn begin(&mut self, sizes: MeshSizes) -> Result<()> {
+        self.points.clear();
         self.points.reserve_exact(sizes.points as usize);
+        self.faces = Polygons::default();
         self.faces.reserve_exact(sizes.faces as usize, sizes.corners as usize);
         Ok(())
     }

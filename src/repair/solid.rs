@@ -82,6 +82,17 @@ impl Solid {
         Ok((Solid { octree, frame, points }, report))
     }
 
+    /// Makes the topology that of a sketch in model units: see [`topology::conform`]. Cuts and fills that were made before are forgotten.
+    ///
+    /// # Errors
+    /// When the sketch does not lie within the grid, is too fine for it, or comes by no part of the solid, and `Cancelled`.
+    pub fn conformed(self, sketch: &topology::Sketch, progress: &dyn Progress) -> Result<(Solid, TopologyReport)> {
+        let Solid { octree, frame, points } = self;
+        let in_cells = sketch.moved(|at| ((glam::DVec3::from(at) - frame.origin()) / frame.cell_size()).to_array());
+        let (octree, report) = topology::conform(octree.into_signed(), &in_cells, progress)?;
+        Ok((Solid { octree, frame, points }, report))
+    }
+
     /// The same solid told by signs alone, as octree files need it: itself if there are no cuts and fills, and otherwise on a grid twice
     /// as fine. Its topology is the same; its surface is drawn back to within half an old cell of what is inside.
     ///

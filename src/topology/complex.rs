@@ -68,6 +68,8 @@ pub(super) struct Brick {
     pub(super) live: Option<Box<Planes>>,
     /// None when nothing was ever removed.
     pub(super) record: Option<Box<Record>>,
+    /// Points and edges that thinning leaves alone, if there are any.
+    pub(super) kept: Option<Box<Planes>>,
 }
 
 /// With what each element that has been removed as the upper part of a pair was removed.
@@ -120,10 +122,28 @@ pub(super) struct Spot {
 impl Complex {
     /// The elements of the solid, or the dual of all others. Cost: some 0.5 us a listed brick, in parallel.
     pub fn new(octree: &EditedOctree, side: Side) -> Complex {
+        Complex::with_kept(octree, side, &[])
+    }
+
+    /// The elements of the solid, of which `kept`, finest points and edges with their ends, are never to be removed: a subcomplex onto
+    /// which what is left can be pushed. Cost as [`new`](Self::new).
+    pub fn keeping(octree: &EditedOctree, kept: &[Key]) -> Complex {
+        let mut complex = Complex::with_kept(octree, Side::Object, kept);
+        for &element in kept {
+            let Some(Spot { brick, extent, local }) = complex.spot(element) else { continue };
+            let planes = complex.bricks[brick as usize].kept.get_or_insert_with(|| Box::new(EMPTY));
+            planes[extent.index()].set(local);
+        }
+        complex
+    }
+
+    /// As `keeping`, but nothing is kept yet: the bricks are there.
+    fn with_kept(octree: &EditedOctree, side: Side, kept: &[Key]) -> Complex {
         let crossings = octree.signed().crossings();
         let depth = crossings.depth();
         let mut keys: Vec<Key> = crossings.bricks().iter().map(|brick| brick.key).collect();
-        let further = octree.edited_bricks();
+        let mut further = octree.edited_bricks();
+        further.extend(kept.iter().filter_map(|&element| owner(depth, element).0));
         if further.iter().any(|key| crossings.find(*key).is_none()) {
             keys.extend(further);
             keys.par_sort_unstable();
@@ -173,7 +193,7 @@ impl Complex {
         });
         let planes = self.turned(key, octree.elements(key));
         let live = planes.iter().any(|plane| !plane.is_empty()).then(|| Box::new(planes));
-        Brick { key, around, live, record: None }
+        Brick { key, around, live, record: None, kept: None }
     }
 
     /// The planes of a brick in the complex's own coordinates, from those of the solid.
@@ -377,7 +397,7 @@ impl Complex {
         }
         let solid = if self.side == Side::Object { FULL } else { EMPTY };
         let live = Some(Box::new(self.turned(key, solid)));
-        self.bricks.push(Brick { key, around, live, record: None });
+        self.bricks.push(Brick { key, around, live, record: None, kept: None });
         Some(place)
     }
 

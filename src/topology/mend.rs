@@ -76,6 +76,8 @@ pub struct TopologyReport {
     pub cuts: Vec<Handle>,
     /// Tunnels that were filled.
     pub fills: Vec<Handle>,
+    /// Walls that were drilled through, where a sketch has a loop ([`conform`](super::conform)).
+    pub drilled: u64,
     /// Cavities that were filled.
     pub cavities_filled: u64,
     /// Floating parts that were dropped.
@@ -86,6 +88,14 @@ pub struct TopologyReport {
     pub added: u64,
     /// Finest cells that belong to the solid no more, or one of whose faces does that did not.
     pub changed_cells: u64,
+}
+
+impl TopologyReport {
+    pub(super) fn count_edits(&mut self, octree: &EditedOctree) {
+        self.removed = octree.removed().len() as u64;
+        self.added = octree.added().len() as u64;
+        self.changed_cells = octree.changed_cells();
+    }
 }
 
 /// All loops of one side.
@@ -107,12 +117,22 @@ impl Loops {
     pub fn find(octree: &EditedOctree, side: Side, limit: f64, progress: &dyn Progress) -> Result<Loops> {
         let beside = Beside { progress, bytes: octree.bytes() as u64 };
         beside.hold(Complex::bytes_for(octree) as u64)?;
-        let mut complex = Complex::new(octree, side);
+        Loops::of(octree, Complex::new(octree, side), limit, progress)
+    }
+
+    /// As [`find`](Self::find), of a complex that has not been thinned yet.
+    pub(super) fn of(
+        octree: &EditedOctree,
+        mut complex: Complex,
+        limit: f64,
+        progress: &dyn Progress,
+    ) -> Result<Loops> {
+        let beside = Beside { progress, bytes: octree.bytes() as u64 };
         thin(&mut complex, layers(limit), &beside)?;
         beside.hold((complex.bytes() + complex.bricks() * SIGN_BYTES) as u64)?;
         let skeleton = Skeleton::new(&complex);
         let found = loops(octree, &complex, &skeleton, limit, progress)?;
-        let kind = match side {
+        let kind = match complex.side() {
             Side::Object => Kind::Cut,
             Side::Background => Kind::Fill,
         };
@@ -157,6 +177,19 @@ impl Loops {
         flow(&self.complex, self.found[i].edge)
     }
 
+    /// The number of finest cells that the removal of a loop alone changes, counted as by [`EditedOctree::changed_cells`]. `octree` is what
+    /// the loops were found in. Cost: some 1 us a square.
+    pub fn changed_cells(&self, octree: &EditedOctree, i: usize) -> u64 {
+        let faces: Vec<Key> = match self.complex.side() {
+            Side::Object => self.section(i).flat_map(Key::coboundary).filter(|face| octree.contains(*face)).collect(),
+            Side::Background => self.section(i).collect(),
+        };
+        let mut cells: Vec<Key> = faces.into_iter().flat_map(Key::coboundary).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells.len() as u64
+    }
+
     /// The size of each arc of the skeleton: area and squares of the section where the solid seems thinnest along it. `octree` is
     /// what the loops were found in. Cost: a section an arc, some 0.2 us a square, in parallel.
     pub fn arc_sizes(&self, octree: &EditedOctree) -> Vec<(f64, u64)> {
@@ -175,9 +208,21 @@ impl Loops {
     /// # Panics
     /// When there are not as many.
     pub fn remove(&self, octree: EditedOctree, chosen: &[usize]) -> EditedOctree {
-        let edges: Vec<_> = chosen.iter().map(|&i| self.found[i].edge).collect();
-        let elements = patches(&octree, &self.complex, &edges);
+        let elements = self.patches(&octree, chosen);
         octree.with(elements, self.complex.side() == Side::Background)
+    }
+
+    /// The elements that are taken away, or added, to remove some of the loops.
+    pub(super) fn patches(&self, octree: &EditedOctree, chosen: &[usize]) -> Vec<Key> {
+        let edges: Vec<_> = chosen.iter().map(|&i| self.found[i].edge).collect();
+        patches(octree, &self.complex, &edges)
+    }
+
+    /// Some of the loops with the number of cells that each changes, from the cheapest on.
+    pub(super) fn by_cost(&self, octree: &EditedOctree, chosen: Vec<usize>) -> Vec<(u64, usize)> {
+        let mut list: Vec<_> = chosen.into_par_iter().map(|i| (self.changed_cells(octree, i), i)).collect();
+        list.sort_unstable();
+        list
     }
 }
 
@@ -260,9 +305,7 @@ pub fn repair_topology_watched(
     if octree.is_edited() {
         report.after = Betti::of(&octree);
     }
-    report.removed = octree.removed().len() as u64;
-    report.added = octree.added().len() as u64;
-    report.changed_cells = octree.changed_cells();
+    report.count_edits(&octree);
     Ok((octree, report))
 }
 
@@ -309,32 +352,20 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Cuts or fills, whichever is smaller. Every handle goes round a tunnel, and once it is cut, the tunnel is gone; but nobody says which
-    /// belongs to which. So both are looked for anew after each of a few runs from small to large: of the side that has the smallest
-    /// loop, those that are smaller than any of the other side are removed, but not less than a quarter of what it has of this size.
-    /// Sizes rise in steps of four, and erosion with them, so that small loops do not cost a thinning of the whole volume.
+    /// Cuts or fills, whichever changes fewer cells. Every handle goes round a tunnel, and once it is cut, the tunnel is gone; but nobody
+    /// says which belongs to which. So both are looked for anew after each of a few runs from small to large: of the side that has the
+    /// cheapest loop, those that are cheaper than any of the other side are removed, but not less than a quarter of what it has of this
+    /// size. Sizes rise in steps of four, and erosion with them, so that small loops do not cost a thinning of the whole volume.
     fn cheapest(&mut self) -> Result<()> {
         let depth = self.octree.signed().crossings().depth();
-        let sides = [Side::Object, Side::Background];
-        let bounds = sides.map(|side| self.options.size(side).unwrap_or(f64::INFINITY));
         let mut excess = self.report.after.handles.saturating_sub(self.options.genus.unwrap_or(0)) as usize;
         let mut size = FIRST_SIZE;
         while excess > 0 {
-            let mut found = Vec::with_capacity(2);
-            for (side, bound) in sides.into_iter().zip(bounds) {
-                let area = size.min(self.options.area(side, bound));
-                let loops = Loops::find(&self.octree, side, area, self.progress)?;
-                let mut chosen = self.up_to(&loops, bound);
-                chosen.retain(|&i| loops.handles[i].area <= area);
-                found.push((loops, chosen));
-            }
-            let smallest = [0, 1].map(|side: usize| {
-                let (loops, chosen) = &found[side];
-                chosen.first().map_or(f64::INFINITY, |&i| loops.handles[i].area)
-            });
-            let side = usize::from(smallest[1] < smallest[0]);
-            let (loops, chosen) = &found[side];
-            if chosen.is_empty() {
+            let found = [self.by_cost(Side::Object, size)?, self.by_cost(Side::Background, size)?];
+            let least = [0, 1].map(|side: usize| found[side].1.first().map_or(u64::MAX, |cheapest| cheapest.0));
+            let side = usize::from(least[1] < least[0]);
+            let (loops, list) = &found[side];
+            if list.is_empty() {
                 if size.is_infinite() {
                     break;
                 }
@@ -342,11 +373,22 @@ impl Work<'_> {
                 size = if size < 4f64.powi(depth as i32) { 4.0 * size } else { f64::INFINITY };
                 continue;
             }
-            let run = chosen.partition_point(|&i| loops.handles[i].area <= smallest[1 - side]);
-            let count = run.max(chosen.len().div_ceil(4)).min(excess);
-            self.apply(loops, &chosen[..count])?;
+            let run = list.partition_point(|(cost, _)| *cost <= least[1 - side]);
+            let count = run.max(list.len().div_ceil(4)).min(excess);
+            let chosen: Vec<usize> = list[..count].iter().map(|(_, i)| *i).collect();
+            self.apply(loops, &chosen)?;
             excess -= count;
         }
         Ok(())
+    }
+
+    /// The loops of a side that may be removed, with the number of cells that each changes, from the cheapest on: those of up to `size`
+    /// cells, which have about as much area at most, so that none is missing.
+    fn by_cost(&self, side: Side, size: f64) -> Result<(Loops, Vec<(u64, usize)>)> {
+        let bound = self.options.size(side).unwrap_or(f64::INFINITY);
+        let loops = Loops::find(&self.octree, side, size.min(self.options.area(side, bound)), self.progress)?;
+        let mut list = loops.by_cost(&self.octree, self.up_to(&loops, bound));
+        list.retain(|(cost, _)| *cost as f64 <= size);
+        Ok((loops, list))
     }
 }

@@ -59,6 +59,7 @@
 
 mod betti;
 mod complex;
+mod conform;
 mod flow;
 mod label;
 mod member;
@@ -69,6 +70,7 @@ mod oracle;
 mod patch;
 mod section;
 mod skeleton;
+mod sketch;
 mod span;
 #[cfg(test)]
 mod tests;
@@ -77,9 +79,11 @@ mod volumes;
 
 pub use betti::Betti;
 pub use complex::{Complex, Side};
+pub use conform::conform;
 pub use member::Members;
 pub use mend::{Handle, Kind, Loops, Round, TopologyReport, handles, layers, repair_topology, repair_topology_watched};
 pub use options::{Measure, Options};
 pub use skeleton::{Arc, Node, Skeleton};
+pub use sketch::Sketch;
 pub use thin::{Thinned, thin};
 pub use volumes::{move_small, volumes};

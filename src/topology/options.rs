@@ -12,11 +12,11 @@ pub struct Options {
     pub cut: Option<f64>,
     /// Fill tunnels of up to this cross-section, after cutting.
     pub fill: Option<f64>,
-    /// Remove the smallest handles and tunnels, by cut or fill, whichever is smaller, until at most so many handles are left. `cut` and
-    /// `fill`, where given, bound what may be used.
+    /// Remove the smallest handles and tunnels, by cut or fill, whichever changes fewer cells, until at most so many handles are left. `cut`
+    /// and `fill`, where given, bound what may be used.
     pub genus: Option<u64>,
-    /// Decide for each loop whether to cut or to fill, whichever is smaller, instead of cutting first. `cut` and `fill` bound what may be
-    /// used, without a bound where they are not given.
+    /// Decide for each loop whether to cut or to fill, whichever changes fewer cells, instead of cutting first. `cut` and `fill` bound what may
+    /// be used, without a bound where they are not given.
     pub cheapest: bool,
     /// Fill cavities of up to this volume.
     pub fill_cavities: Option<f64>,

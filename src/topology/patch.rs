@@ -17,19 +17,19 @@ use crate::grid::{Extent, Face, Key};
 use crate::octree::EditedOctree;
 use crate::octree::edited::alternating;
 
-/// The elements that go with some edges of the skeleton, in no particular order.
+/// The elements that go with some edges of the skeleton, or faces of [walls](super::skeleton::walls), in no particular order.
 ///
 /// `octree` is what the complex was made of.
-pub(super) fn patches(octree: &EditedOctree, complex: &Complex, edges: &[Spot]) -> Vec<Key> {
+pub(super) fn patches(octree: &EditedOctree, complex: &Complex, first: &[Spot]) -> Vec<Key> {
     let mut patch = Patch { octree, complex, bricks: Vec::new(), pending: Vec::new(), gone: Vec::new() };
     patch.bricks.resize_with(complex.bricks.len(), || None);
-    edges.iter().for_each(|&edge| patch.add(edge));
+    first.iter().for_each(|&spot| patch.add(spot));
     while let Some(spot) = patch.pending.pop() {
         patch.spread(spot);
     }
     debug_assert_eq!(
         patch.gone.iter().map(|spot| alternating(spot.extent)).sum::<i64>(),
-        -(edges.len() as i64),
+        first.iter().map(|spot| alternating(spot.extent)).sum::<i64>(),
         "pairs go as a whole"
     );
     patch.gone.iter().map(|&spot| complex.key(spot)).collect()

@@ -4,12 +4,16 @@
 //! not eroded, is contracted to a node each, and so is the sentinel of the background: what loops there may be inside cannot be
 //! removed by a patch through an edge. Nodes at which two edges of the graph meet lie within arcs.
 //!
+//! Where a subcomplex is kept ([`Complex::keeping`]), it is one node with all that hangs together with it by faces, and its edges are none of the
+//! graph: loops are what does not come down to it. Sheets are then not closed, but may end on it ([`walls`]).
+//!
 //! Cost: that of [`Labels`], and some 50 ns an edge of the graph.
 
 use super::complex::{Complex, DEEP, Spot};
 use super::label::{Labels, SENTINEL};
 use crate::grid::brick::Plane;
 use crate::grid::{Axis, Extent, Face, Key};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// What stands at the end of an arc.
@@ -23,6 +27,8 @@ pub enum Node {
     Core,
     /// What is outside of the background's box.
     Sentinel,
+    /// All that is kept, as one node.
+    Kept,
 }
 
 /// A chain of edges.
@@ -49,14 +55,23 @@ impl Skeleton {
         let covered = |brick: u32| covered_edges(complex, brick);
         let labels = Labels::new(complex, covered);
         let mut graph = Graph { edges: Vec::new(), degree: vec![0; labels.names()], kind: kinds(complex, &labels) };
+        let first_kept = graph.kind.iter().position(|kind| *kind == Node::Kept);
         for brick in 0..complex.bricks.len() as u32 {
             let covered = covered(brick);
+            let kept = complex.bricks[brick as usize].kept.as_deref();
             for axis in Axis::ALL {
                 let extent = Extent::from(axis);
-                let free = complex.live(brick)[extent.index()] & !covered[axis.index()];
+                let mut free = complex.live(brick)[extent.index()] & !covered[axis.index()];
+                if let Some(kept) = kept {
+                    free &= !kept[extent.index()];
+                }
                 for local in free.iter() {
                     let spot = Spot { brick, extent, local };
-                    graph.push(spot, [false, true].map(|high| labels.end(complex, spot, high)));
+                    let ends = [false, true].map(|high| match (labels.end(complex, spot, high), first_kept) {
+                        (end, Some(first)) if graph.kind[end as usize] == Node::Kept => first as u32,
+                        (end, _) => end,
+                    });
+                    graph.push(spot, ends);
                 }
             }
         }
@@ -91,6 +106,48 @@ impl Skeleton {
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
+}
+
+/// Of each connected set of faces that is left beside what is kept, the face at which the solid is drilled through in the fewest steps. Where all
+/// cavities are filled, such a wall spans what should be open, and without any one of its faces it collapses further.
+/// Cost: that of [`Labels`], and some 30 ns a cell of the ways through.
+pub(super) fn walls(complex: &Complex) -> Vec<Spot> {
+    let faces = |brick: u32| Axis::ALL.map(|normal| (!Extent::from(normal), complex.live(brick)));
+    let bricks = 0..complex.bricks.len() as u32;
+    if bricks.clone().all(|brick| faces(brick).iter().all(|(face, live)| live[face.index()].is_empty())) {
+        return Vec::new();
+    }
+    let labels = Labels::new(complex, |brick| covered_edges(complex, brick));
+    let mut least: BTreeMap<u32, (usize, Spot)> = BTreeMap::new();
+    for brick in bricks {
+        for (extent, live) in faces(brick) {
+            for local in live[extent.index()].iter() {
+                let face = Spot { brick, extent, local };
+                let wall = labels.set(brick, local).expect("the corners of a live face are live");
+                let way = (steps_through(complex, face), face);
+                least.entry(wall).and_modify(|least| *least = way.min(*least)).or_insert(way);
+            }
+        }
+    }
+    least.into_values().map(|(_, face)| face).collect()
+}
+
+/// The cells that were removed with the faces on the way from a face to the surface, on both sides.
+fn steps_through(complex: &Complex, face: Spot) -> usize {
+    let normal = (!face.extent).axes().next().expect("a face has a normal");
+    let side = |high: bool| {
+        let mut cell = complex.half_toward(face, Face::new(normal, high));
+        std::iter::from_fn(move || {
+            let here = cell?;
+            let record = complex.bricks[here.brick as usize].record.as_deref()?;
+            let out = record.face_of(here.local)?;
+            // The cell beyond the face that it was removed with.
+            cell = complex.step(here.brick, here.local, out).map(|(brick, local)| Spot { brick, local, ..here });
+            Some(())
+        })
+        .count()
+    };
+    side(false) + side(true)
 }
 
 /// The edges of a brick that have a face.
@@ -128,6 +185,10 @@ fn kinds(complex: &Complex, labels: &Labels) -> Vec<Node> {
                     raise(set, kind);
                 }
             }
+        }
+        if let Some(kept) = complex.bricks[brick as usize].kept.as_deref() {
+            let of_kept = labels.parts(brick).filter(|(_, part)| !(**part & kept[Extent::POINT.index()]).is_empty());
+            of_kept.for_each(|(set, _)| raise(set, Node::Kept));
         }
         for face in Face::ALL.into_iter().filter(|&face| complex.beside(brick, face) == DEEP) {
             raise(labels.set_beside(complex, brick, face), Node::Core);

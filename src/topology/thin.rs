@@ -20,6 +20,11 @@
 //! Collapses may come in any order. Those of cells (erosion) can be limited to a number of layers; those of faces and edges, which live
 //! on sheets and curves, always run to the end. What is left of the cells is the core: thicker than twice that many layers.
 //!
+//! # What is kept
+//!
+//! Points and edges of a subcomplex that is kept ([`Complex::keeping`]) are never marked. None of them is chosen from below either: a kept edge has
+//! kept ends. So what is left can be pushed onto it as far as that goes, and what lies beside it says how the solid differs.
+//!
 //! # What is remembered
 //!
 //! For each face removed with an edge, which edge; for each cell removed with a face, which face: twelve planes a brick
@@ -162,9 +167,13 @@ impl Marks {
         (self.brick, self.kinds, self.waiting) = (brick, 0, false);
         let live = complex.live(brick);
         let low = Axis::ALL.map(|axis| complex.live(complex.beside(brick, Face::new(axis, false))));
+        let kept = complex.bricks[brick as usize].kept.as_deref();
         let mut any = [0; 7];
         for x in 0..8 {
-            let marked = once_covered(live, low, x);
+            let mut marked = once_covered(live, low, x);
+            if let Some(kept) = kept {
+                marked.iter_mut().zip(kept).for_each(|(marked, kept)| *marked &= !kept.0[x]);
+            }
             for (extent, word) in marked.into_iter().enumerate() {
                 any[extent] |= word;
                 self.planes[extent].0[x] = word;

@@ -21,14 +21,37 @@ pub fn volumes(signed: &SignedOctree, side: Side) -> Vec<u64> {
 /// filled. Returns the octree and the number of components moved.
 pub fn move_small(signed: SignedOctree, side: Side, volume: f64) -> (SignedOctree, u64) {
     let components = Components::new(&signed);
+    let moved = moved(&components, side, |_, component| component.points as f64 <= volume);
+    moved.unwrap_or((signed, 0))
+}
+
+/// Drops all solids of which none of some lattice points, in cells, is a part. Returns the octree, the number of solids dropped, and of those that
+/// are left.
+pub(super) fn drop_untouched(
+    signed: &SignedOctree,
+    points: impl Iterator<Item = [u32; 3]>,
+) -> (SignedOctree, u64, u64) {
+    let components = Components::new(signed);
+    let mut touched = vec![false; components.list().len()];
+    points.for_each(|at| touched[components.of_point(at) as usize] = true);
+    let left = components.list().iter().zip(&touched).filter(|(component, touched)| component.is_inside && **touched);
+    let left = left.count() as u64;
+    let (octree, dropped) =
+        moved(&components, Side::Object, |i, _| !touched[i as usize]).unwrap_or_else(|| (signed.clone(), 0));
+    (octree, dropped, left)
+}
+
+/// Moves those components of a side for which the answer is yes to the other side; none if there are none. The outside is never filled.
+fn moved(
+    components: &Components<'_>,
+    side: Side,
+    is_moved: impl Fn(u32, &Component) -> bool + Sync,
+) -> Option<(SignedOctree, u64)> {
     let list = components.list();
-    let is_small = |i: u32| {
+    let is_moved = |i: u32| {
         let component = &list[i as usize];
-        i > 0 && component.is_inside == (side == Side::Object) && component.points as f64 <= volume
+        i > 0 && component.is_inside == (side == Side::Object) && is_moved(i, component)
     };
-    let moved = (0..list.len() as u32).filter(|&i| is_small(i)).count() as u64;
-    if moved == 0 {
-        return (signed, 0);
-    }
-    (components.without(is_small), moved)
+    let count = (0..list.len() as u32).filter(|&i| is_moved(i)).count() as u64;
+    (count > 0).then(|| (components.without(is_moved), count))
 }

@@ -215,6 +215,16 @@ impl Image {
         self.placed(Placement { axes, ..placement })
     }
 
+    /// One material, where samples are numbers of materials: 1 where a sample equals `label`, 0 elsewhere, so that the level 1/2 lies between. For
+    /// what needs a field, as [sampling anew](Self::on_cubes) does; [`Label`](super::Label) is the same without a copy. Cost: one pass, in parallel.
+    #[must_use]
+    pub fn material(&self, label: f64) -> Self {
+        let voxels = with_samples!(&self.voxels, samples => {
+            Voxels::U8(samples.par_iter().map(|&sample| u8::from(wide(sample) == label)).collect())
+        });
+        Image { voxels, ..*self }
+    }
+
     /// The place of a sample among the voxels.
     #[inline]
     pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -286,6 +296,14 @@ mod tests {
         assert_eq!(rows, [0, 0b10, 0b11]);
         assert_eq!(Volume::value(&image, [1, 0, 2]), 5.0);
         assert_eq!(image.gradient(DVec3::new(0.5, 0.0, 1.0)), DVec3::new(1.0, 0.0, 2.0));
+    }
+
+    #[test]
+    fn materials_are_told_by_their_number() {
+        let image = Image::new([2, 2, 1], Placement::default(), Voxels::I16(vec![3, -2, 3, 0])).unwrap();
+        let material = |label| image.material(label).voxels;
+        assert_eq!(material(3.0), Voxels::U8(vec![1, 0, 1, 0]));
+        assert_eq!((material(-2.0), material(0.5)), (Voxels::U8(vec![0, 1, 0, 0]), Voxels::U8(vec![0; 4])));
     }
 
     #[test]

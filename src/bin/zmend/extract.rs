@@ -1,6 +1,6 @@
 //! `zmend extract`: from volumes to surfaces.
 
-use crate::args::ExtractArgs;
+use crate::args::{ExtractArgs, MethodArg};
 use crate::bars::Bars;
 use crate::goal::{self, GoalFormat};
 use crate::measure::Side;
@@ -26,13 +26,9 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
     let topology = args.handles.options();
     match to {
         GoalFormat::Mesh(format) if topology.is_nothing() => direct(args, format)?,
-        _ if args.label.is_some() => {
-            let problem = "labels become meshes, without topology repair";
-            return Err(Error::setting("label", problem, "take --iso for octrees and topology repair"));
-        }
         _ => {
             let of_octree = |problem: &str, remedy: &str| Err(Error::setting("method", problem, remedy));
-            let Some(surface) = args.method.surface() else {
+            let Some(surface) = args.method().surface() else {
                 return of_octree(
                     "octrees, on which topology is repaired, have no such surface",
                     "take mc, dc or nets",
@@ -50,7 +46,17 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
             let (cell, max_memory, tell) = (args.cell, args.max_memory, &args.tell);
             let work = Work { options, given, cell, max_memory, cloud: None, write, tell };
             let volume = Some(&args.volume);
-            solid::run(&Job { input, goal: out, to, work, topology, volume, skeleton: None, patches: None })?;
+            solid::run(&Job {
+                input,
+                goal: out,
+                to,
+                work,
+                topology,
+                sketch: None,
+                volume,
+                skeleton: None,
+                patches: None,
+            })?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -59,9 +65,11 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
 /// Extracts the surface from the volume itself.
 fn direct(args: &ExtractArgs, format: Format) -> Result<()> {
     let ExtractArgs { input, out, write, tell, .. } = args;
+    let label = args.volume.label;
+    check_label(args)?;
     let bars = Bars::new(!tell.quiet && !tell.json).within(memory::limit(args.max_memory)?);
     let start = Instant::now();
-    let (mut volume, level) = match args.label {
+    let (mut volume, level) = match label {
         Some(label) => (Loaded::labelled(input, &args.volume, label, &bars)?, Level::above(0.0)),
         None => Loaded::open(input, &args.volume, &bars)?,
     };
@@ -75,15 +83,16 @@ fn direct(args: &ExtractArgs, format: Format) -> Result<()> {
     image.corners().into_iter().for_each(|corner| bounds.add(corner));
     let (precision, _) = digits::of_box(&bounds, placement.spacing().min_element(), format, write.ascii)?;
     let border = if args.open { Border::Open } else { Border::Closed };
-    let options = ExtractOptions { level, method: args.method.into(), border, placement, ..ExtractOptions::default() };
+    let options =
+        ExtractOptions { level, method: args.method().into(), border, placement, ..ExtractOptions::default() };
     let write_options = WriteOptions { precision, is_text: write.ascii, ..WriteOptions::default() };
     let (sizes, extracted, bytes) = interrupt::noted(|| {
         let mut writer = io::create(out, format, write_options)?;
-        let sizes = match args.label {
+        let sizes = match label {
             Some(label) => extract_label(&image, label, &options, &mut writer, &bars)?,
             None => extract(&image, &options, &mut writer, &bars)?,
         };
-        if args.label.is_some() && sizes.points == 0 {
+        if label.is_some() && sizes.points == 0 {
             return Err(told.without_label());
         }
         let extracted = start.elapsed();
@@ -107,6 +116,21 @@ fn direct(args: &ExtractArgs, format: Format) -> Result<()> {
         ("total", total),
     ];
     Outcome { args, format, told, side, times, peak_memory }.tell()
+}
+
+/// Refuses what would not leave the surfaces of labels fit together.
+fn check_label(args: &ExtractArgs) -> Result<()> {
+    if args.volume.label.is_none() {
+        return Ok(());
+    }
+    let refuse = |option: &'static str, problem: &str| Err(Error::setting(option, problem, "leave this option away"));
+    if args.method() != MethodArg::Nets {
+        return refuse("method", "surfaces of labels fit together by surface nets only");
+    }
+    if args.cell.is_some() {
+        return refuse("cell", "numbers of materials cannot be interpolated");
+    }
+    Ok(())
 }
 
 /// What came out.
@@ -145,8 +169,8 @@ impl Outcome<'_> {
                 "options": {
                     "iso": volume.iso,
                     "below": volume.below,
-                    "label": args.label,
-                    "method": if args.label.is_some() { "nets" } else { args.method.name() },
+                    "label": volume.label,
+                    "method": args.method().name(),
                     "open": args.open,
                     "threads": rayon::current_num_threads(),
                 },

@@ -61,6 +61,9 @@ pub(crate) fn report_text(report: &TopologyReport, frame: &Frame, cell: f64, mea
         units::counted(cuts.len() as u64, "handle cut", "handles cut"),
         units::counted(fills.len() as u64, "tunnel filled", "tunnels filled"),
     ];
+    if report.drilled > 0 {
+        done.push(units::counted(report.drilled, "wall drilled through", "walls drilled through"));
+    }
     if report.islands_dropped > 0 {
         done.push(units::counted(report.islands_dropped, "floating part dropped", "floating parts dropped"));
     }
@@ -82,6 +85,7 @@ pub(crate) fn report_json(report: &TopologyReport, frame: &Frame, cell: f64, mea
         "after": betti_json(&report.after),
         "cuts": list(&report.cuts),
         "fills": list(&report.fills),
+        "drilled": report.drilled,
         "islands_dropped": report.islands_dropped,
         "cavities_filled": report.cavities_filled,
         "removed_elements": report.removed,

@@ -41,7 +41,8 @@ fn make(input: &Path, goal: &Path, args: &WorkArgs, offset: Option<Offset>) -> R
     let (None, GoalFormat::Mesh(format)) = (OctreeFormat::of_file(input)?, format) else {
         let mut work = Work::new(args, SurfaceArg::Mc);
         work.options.offset = offset;
-        let job = Job { input, goal, to: format, work, topology, volume: None, skeleton: None, patches: None };
+        let job =
+            Job { input, goal, to: format, work, topology, sketch: None, volume: None, skeleton: None, patches: None };
         return solid::run(&job).map(|()| ExitCode::SUCCESS);
     };
     let mut options = Options { topology, offset, ..options(args, SurfaceArg::Mc) };

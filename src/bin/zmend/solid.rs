@@ -28,6 +28,8 @@ pub(crate) struct Job<'a> {
     pub(crate) work: Work<'a>,
     /// What becomes of handles and tunnels.
     pub(crate) topology: topology::Options,
+    /// What the topology shall be, where a sketch says so.
+    pub(crate) sketch: Option<topology::Sketch>,
     /// What is said of the input in case that it is a volume, where volumes are taken.
     pub(crate) volume: Option<&'a VolumeArgs>,
     /// Where skeleton and membranes are written.
@@ -170,7 +172,7 @@ pub(crate) fn run(job: &Job<'_>) -> Result<()> {
     let mut options = work.options;
     let cell = solid.frame.cell_size();
     let mut topology = None;
-    if !job.topology.is_nothing() || job.skeleton.is_some() || job.patches.is_some() {
+    if !job.topology.is_nothing() || job.sketch.is_some() || job.skeleton.is_some() || job.patches.is_some() {
         let begun = Instant::now();
         let (mended, report) = mend(job, solid, &bars)?;
         (solid, topology) = (mended, Some(report));
@@ -193,6 +195,9 @@ pub(crate) fn run(job: &Job<'_>) -> Result<()> {
 
 /// Repairs the topology, and writes what can be looked at of it.
 fn mend(job: &Job<'_>, solid: Solid, bars: &Bars) -> Result<(Solid, TopologyReport)> {
+    if let Some(sketch) = &job.sketch {
+        return solid.conformed(sketch, bars);
+    }
     let mut trace = Trace::default();
     let mut watch = |round: &topology::Round<'_>| {
         if job.skeleton.is_some() {

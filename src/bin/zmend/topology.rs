@@ -8,10 +8,11 @@ use crate::solid::{self, Job, Work, open};
 use crate::{json, memory, print, units, volume};
 use serde_json::json;
 use std::process::ExitCode;
+use zmend::io::skeleton::Polylines;
 use zmend::io::{self, OctreeFormat};
 use zmend::progress::{Progress, Stage};
 use zmend::repair::{Trace, membranes};
-use zmend::topology::{Betti, Handle, Kind, Loops, Measure, Members, Side, volumes};
+use zmend::topology::{Betti, Handle, Kind, Loops, Measure, Members, Side, Sketch, volumes};
 use zmend::{Result, Solid};
 
 /// Volumes of parts and cavities that are listed for people.
@@ -33,7 +34,11 @@ pub(crate) fn run(args: &TopologyArgs) -> Result<ExitCode> {
     goal::check(goal, &[input], work.write.force)?;
     let work = Work::new(work, default_surface(args)?);
     let volume = Some(&args.volume);
-    solid::run(&Job { input, goal, to, work, topology, volume, skeleton, patches }).map(|()| ExitCode::SUCCESS)
+    let sketch = args.sketch.as_ref().map(io::sketch::read).transpose()?.map(|Polylines { points, lines }| {
+        let points = points.into_iter().map(Into::into).collect();
+        Sketch::of_chains(points, lines.iter().map(|line| &line.0[..]))
+    });
+    solid::run(&Job { input, goal, to, work, topology, sketch, volume, skeleton, patches }).map(|()| ExitCode::SUCCESS)
 }
 
 /// SOG files have the points of dual contouring.

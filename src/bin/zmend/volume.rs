@@ -77,6 +77,9 @@ impl Loaded {
 
     /// Reads a file as the command line says, and checks that there is a surface.
     pub(crate) fn open(path: &Path, args: &VolumeArgs, progress: &dyn Progress) -> Result<(Self, Level)> {
+        if let Some(label) = args.label {
+            return Ok((Loaded::labelled(path, args, label, progress)?.material(label)?, Level::above(0.5)));
+        }
         let mut loaded = Loaded::spaced(path, args, progress)?;
         let level = loaded.level(args)?;
         loaded.told.level = Some(level);
@@ -88,6 +91,15 @@ impl Loaded {
         let mut loaded = Loaded::spaced(path, args, progress)?;
         loaded.told.label = Some(label);
         Ok(loaded)
+    }
+
+    /// The field of a material, if it occurs: 1 where it is, 0 elsewhere.
+    fn material(self, label: f64) -> Result<Self> {
+        let image = self.image.material(label);
+        if image.voxels().range().greatest == 0.0 {
+            return Err(self.told.without_label());
+        }
+        Ok(Loaded { image, told: self.told })
     }
 
     fn spaced(path: &Path, args: &VolumeArgs, progress: &dyn Progress) -> Result<Self> {

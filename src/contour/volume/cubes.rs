@@ -14,20 +14,21 @@ use glam::DVec3;
 
 /// The triangles of all cases, as edges of the cell.
 pub(super) struct Triangles {
-    /// Those of case m are at `starts[m] .. starts[m + 1]`.
+    /// Those of a case are between its ends.
     edges: Vec<u8>,
-    starts: [u16; 257],
+    ends: [[u16; 2]; 256],
 }
 
 impl Triangles {
     /// Counter-clockwise seen from outside, or clockwise if they are `turned`.
     pub(super) fn new(turned: bool) -> Self {
-        let mut triangles = Triangles { edges: Vec::new(), starts: [0; 257] };
-        for (case, end) in CASES.iter().zip(1..) {
+        let mut triangles = Triangles { edges: Vec::new(), ends: [[0; 2]; 256] };
+        for (case, mask) in CASES.iter().zip(0..) {
+            let start = triangles.edges.len() as u16;
             for [a, b, c] in case.triangles.iter().map(|t| t.map(|e: Edge| e.index() as u8)) {
                 triangles.edges.extend(if turned { [a, c, b] } else { [a, b, c] });
             }
-            triangles.starts[end] = triangles.edges.len() as u16;
+            triangles.ends[mask] = [start, triangles.edges.len() as u16];
         }
         triangles
     }
@@ -35,7 +36,7 @@ impl Triangles {
     /// The corners of the triangles of a case, three for each.
     #[inline]
     pub(super) fn of(&self, mask: Mask) -> &[u8] {
-        let [start, end] = [0, 1].map(|i| usize::from(self.starts[usize::from(mask) + i]));
+        let [start, end] = self.ends[usize::from(mask)].map(usize::from);
         &self.edges[start..end]
     }
 }

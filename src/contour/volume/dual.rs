@@ -1,7 +1,8 @@
 //! Dual contouring (Ju, Losasso, Schaefer and Warren 2002) and surface nets (Gibson 1998), manifold for any signs.
 //!
 //! Each [polygon](super::polygons) has a vertex: at the mean of its crossings (nets), or where its tangent planes meet. Each crossed edge
-//! has a face between the vertices of the polygons round it: a quadrilateral, but for cells whose cycles are cut, where it has more corners.
+//! has a face between the vertices of the polygons round it: a quadrilateral, but for cells whose cycles are cut, where it has more corners. So
+//! components and their genus are those of marching cubes.
 //!
 //! # No face without area
 //!
@@ -27,7 +28,10 @@ use glam::{DVec3, I64Vec3};
 use std::sync::LazyLock;
 
 /// The polygons of all masks, none of which passes through a face twice.
-static POLYGONS: LazyLock<Vec<Polygons>> = LazyLock::new(polygons::all);
+static POLYGONS: LazyLock<Vec<Polygons>> = LazyLock::new(|| polygons::all(true));
+
+/// Those of materials.
+static CAPPED: LazyLock<Vec<Polygons>> = LazyLock::new(|| polygons::all(false));
 
 /// How often vertices are moved at most. Faces without area are as rare as coincidences: none has been seen that was left after two rounds.
 const ROUNDS: u64 = 8;
@@ -49,7 +53,7 @@ impl<'a, V: Volume> Dual<'a, V> {
         sharp: bool,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let polygons: &'static [Polygons] = &POLYGONS;
+        let polygons: &'static [Polygons] = if lattice.volume.has_materials() { &CAPPED } else { &POLYGONS };
         let of_mask = |mask| &polygons[usize::from(mask)].list[..];
         let points = if sharp {
             let solve = |planes: &Planes, _, is_alone| {

@@ -74,10 +74,8 @@ static CYCLES: LazyLock<Vec<Cycles>> = LazyLock::new(|| CASES.iter().map(cycles)
 fn cycles(case: &Case) -> Cycles {
     let numbers =
         |triangles: &[[Edge; 3]]| triangles.as_flattened().iter().map(|e| e.index() as u8).collect::<Vec<_>>();
-    let corners: usize = case.cycles.iter().map(Vec::len).sum();
     let mut cycles = Cycles::default();
-    // Discs have two triangles less than corners; a tunnel has as many.
-    let has_tunnel = case.triangles.len() + 2 * case.cycles.len() != corners;
+    let has_tunnel = case.has_tunnel();
     if has_tunnel {
         cycles.tunnels = numbers(&case.triangles);
     } else {

@@ -1,12 +1,16 @@
-//! The surface of a case as polygons: one for each cycle, or for a part of it.
+//! The surface of a case as polygons: one for each cycle, or for a part of it, and three for a tunnel.
 //!
 //! The polygons of all cells are a closed surface whose vertices are the crossed edges. Its dual has a vertex for each polygon and a face
 //! for each crossed edge, and is a surface, too: but if two cells' polygons have two segments in common, both in an open face, the dual has
 //! two edges between the same two vertices. So cycles that pass through a face twice are cut by diagonals through the cell: then no polygon
 //! does, nor has it corners of both segments, so that diagonals of the dual's faces do not come upon its edges either. The dual is a
 //! manifold for all signs. (Schaefer, Ju and Warren 2007 have a vertex for each cycle, and leave that to chance.)
+//!
+//! Two cycles round one component of inside corners bound a tunnel, as in marching cubes: the band between them is three quadrilaterals. So
+//! components and handles are those of marching cubes. Materials have no tunnels: what is a tunnel for one of them is two caps for the other one
+//! in it, and both shall have the same triangles.
 
-use crate::grid::cases::{CASES, Case, share_face};
+use crate::grid::cases::{CASES, Case, middle, share_face};
 use crate::grid::{Edge, Face};
 
 /// The polygons of a case.
@@ -18,14 +22,17 @@ pub(super) struct Polygons {
     pub(super) around: [Vec<u8>; 12],
 }
 
-/// Those of all masks.
-pub(super) fn all() -> Vec<Polygons> {
-    CASES.iter().map(polygons).collect()
+/// Those of all masks, with tunnels or with caps at both ends of each.
+pub(super) fn all(with_tunnels: bool) -> Vec<Polygons> {
+    CASES.iter().map(|case| polygons(case, with_tunnels)).collect()
 }
 
-fn polygons(case: &Case) -> Polygons {
+fn polygons(case: &Case, with_tunnels: bool) -> Polygons {
     let cut = |cycle: &Vec<Edge>| (1..=9).find_map(|parts| cut(cycle, parts)).expect("checked for all 256 masks");
-    let list: Vec<Vec<Edge>> = case.cycles.iter().flat_map(cut).collect();
+    let list: Vec<Vec<Edge>> = match &case.cycles[..] {
+        [a, b] if with_tunnels && case.has_tunnel() => band(a, b),
+        cycles => cycles.iter().flat_map(cut).collect(),
+    };
     let mut around: [Vec<u8>; 12] = Default::default();
     for edge in case.cycles.iter().flatten() {
         // From the polygon with the segment that leaves the edge on to the one with that which comes.
@@ -66,6 +73,18 @@ fn cut(cycle: &[Edge], parts: usize) -> Option<Vec<Vec<Edge>>> {
     })
 }
 
+/// The band between the rims of a tunnel, which have as many corners, cut along the shortest bridges. The rims are at opposite corners of the
+/// cell, so no bridge lies in a face.
+fn band(a: &[Edge], b: &[Edge]) -> Vec<Vec<Edge>> {
+    let n = a.len();
+    let distance = |a: Edge, b: Edge| (0..3).map(|axis| (middle(a)[axis] - middle(b)[axis]).pow(2)).sum::<i32>();
+    // The rims run against each other.
+    let opposite = |shift: usize, i: usize| b[(shift + n - i) % n];
+    let length = |&shift: &usize| (0..n).map(|i| distance(a[i], opposite(shift, i))).sum::<i32>();
+    let shift = (0..n).min_by_key(length).expect("rims have corners");
+    (0..n).map(|i| vec![a[i], a[(i + 1) % n], opposite(shift, (i + 1) % n), opposite(shift, i)]).collect()
+}
+
 /// Whether a polygon has a side in a face, and more corners there than the ends of that.
 fn passes_twice(polygon: &[Edge]) -> bool {
     let n = polygon.len();
@@ -81,16 +100,43 @@ mod tests {
 
     #[test]
     fn polygons_pass_through_faces_once() {
-        let all = all();
-        for (polygons, case) in all.iter().zip(&*CASES) {
-            assert!(polygons.list.iter().all(|polygon| polygon.len() >= 3 && !passes_twice(polygon)));
-            // Each cut adds its two ends.
-            let corners: usize = polygons.list.iter().map(Vec::len).sum();
-            let cycles: usize = case.cycles.iter().map(Vec::len).sum();
-            assert_eq!(corners, cycles + 2 * (polygons.list.len() - case.cycles.len()));
-            assert_eq!(corners, polygons.around.iter().map(Vec::len).sum::<usize>());
+        for with_tunnels in [false, true] {
+            let all = all(with_tunnels);
+            for (polygons, case) in all.iter().zip(&*CASES) {
+                assert!(polygons.list.iter().all(|polygon| polygon.len() >= 3 && !passes_twice(polygon)));
+                // Each cut adds its two ends. A disc has one less than polygons, a band as many.
+                let corners: usize = polygons.list.iter().map(Vec::len).sum();
+                let cycles: usize = case.cycles.iter().map(Vec::len).sum();
+                let discs = if with_tunnels && case.has_tunnel() { 0 } else { case.cycles.len() };
+                assert_eq!(corners, cycles + 2 * (polygons.list.len() - discs));
+                assert_eq!(corners, polygons.around.iter().map(Vec::len).sum::<usize>());
+            }
+            // Few masks need it.
+            let cut = all.iter().zip(&*CASES).filter(|(p, c)| p.list.len() > c.cycles.len()).count();
+            assert_eq!(cut, if with_tunnels { 40 } else { 36 });
         }
-        // Few masks need it.
-        assert_eq!(all.iter().zip(&*CASES).filter(|(p, c)| p.list.len() > c.cycles.len()).count(), 36);
+    }
+
+    /// The cells that are inside but for two opposite corners have a tunnel, of three quadrilaterals: each has a side on either rim, and
+    /// shares one bridge with each of the others.
+    #[test]
+    fn tunnels_are_bands() {
+        let all = all(true);
+        let tunnels: Vec<usize> = (0..256).filter(|&mask| CASES[mask].has_tunnel()).collect();
+        assert_eq!(
+            tunnels,
+            [24, 36, 66, 129].map(|outside: usize| 255 - outside).into_iter().rev().collect::<Vec<_>>()
+        );
+        for mask in tunnels {
+            let (list, cycles) = (&all[mask].list, &CASES[mask].cycles);
+            assert_eq!(list.len(), 3);
+            for (i, polygon) in list.iter().enumerate() {
+                let on = |rim: usize| polygon.iter().filter(|edge| cycles[rim].contains(edge)).count();
+                assert_eq!([on(0), on(1)], [2, 2]);
+                let next = &list[(i + 1) % 3];
+                assert_eq!(polygon.iter().filter(|edge| next.contains(edge)).count(), 2);
+            }
+            assert!(all[mask].around.iter().all(|around| around.is_empty() || around.len() == 2));
+        }
     }
 }

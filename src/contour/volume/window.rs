@@ -13,8 +13,8 @@ pub(super) struct Window {
     numbers: Vec<u32>,
     /// Where each row begins.
     starts: [usize; 4],
-    /// For each edge of a cell, where its number is, if the cell is the first of its row.
-    edges: [usize; 12],
+    /// For each edge of a cell, where its number is, if the cell is the first of its row. (Sixteen, so that four bits find one without a check.)
+    edges: [usize; 16],
 }
 
 impl Window {
@@ -22,7 +22,7 @@ impl Window {
     pub(super) fn new(width: usize) -> Self {
         // The points beyond the row, up to a multiple of 64 and one more, are looked up by no edge that is crossed.
         let row = 3 * (width.next_multiple_of(64) + 1);
-        let mut window = Window { numbers: vec![0; 4 * row], starts: [0, row, 2 * row, 3 * row], edges: [0; 12] };
+        let mut window = Window { numbers: vec![0; 4 * row], starts: [0, row, 2 * row, 3 * row], edges: [0; 16] };
         window.set_edges();
         window
     }
@@ -59,7 +59,7 @@ impl Window {
     #[inline]
     pub(super) fn at(&self, x: usize) -> impl Fn(u8) -> u32 + '_ {
         let numbers = &self.numbers[3 * x..];
-        move |edge| numbers[self.edges[usize::from(edge)]]
+        move |edge| numbers[self.edges[usize::from(edge & 15)]]
     }
 
     fn set_edges(&mut self) {

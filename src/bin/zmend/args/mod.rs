@@ -14,7 +14,7 @@ pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
 pub(crate) use values::Limit;
-pub(crate) use volume::{ExtractArgs, VolumeArgs};
+pub(crate) use volume::{ExtractArgs, MethodArg, VolumeArgs};
 
 use repair::GridArgs;
 

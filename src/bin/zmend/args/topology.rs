@@ -18,8 +18,9 @@ Examples:
   zmend topology part.sog clean.ply --cut 2.5          cut handles of up to 2.5 square units
   zmend topology scan.ply clean.ply --fill 1 --depth 9      of a mesh, on a grid of 512 cells a side
   zmend topology scan.ply clean.ply --genus 0          none is left, by the least change
-  zmend topology scan.ply clean.ply --cut 4 --fill 4 --cheapest      cut or fill, whichever is smaller
+  zmend topology scan.ply clean.ply --cut 4 --fill 4 --cheapest      cut or fill, whichever changes less
   zmend topology scan.ply clean.ply --cut all --drop-islands 10 --fill-cavities inf
+  zmend topology scan.ply clean.ply --sketch lines.axs      what the lines of a sketch have, and nothing else
   zmend topology scan.mhd clean.ply --iso 41 --genus 0      of a volume
   zmend topology part.sog clean.sog --cut 2.5          an octree again, twice as fine where anything was cut
   zmend topology part.sog clean.ply --cut all --skeleton skeleton.ply --patches patches.ply
@@ -49,6 +50,12 @@ pub(crate) struct TopologyArgs {
     /// Write the membranes of cuts (red) and fills (blue): .ply or .obj.
     #[arg(long, value_name = "FILE")]
     pub(crate) patches: Option<PathBuf>,
+    /// Make the topology that of a sketch: an .axs file, or an OBJ file with lines, in the coordinates of the model. Handles that the lines do not
+    /// have are cut or filled, loops that they have are opened, parts without a line are dropped, and cavities filled.
+    #[arg(long, value_name = "FILE", conflicts_with_all = [
+        "list", "skeleton", "patches", "cut", "fill", "genus", "cheapest", "fill_cavities", "drop_islands",
+    ])]
+    pub(crate) sketch: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) volume: VolumeArgs,
     #[command(flatten)]
@@ -68,7 +75,7 @@ pub(crate) struct HandleArgs {
     /// Remove the smallest handles and tunnels until at most N handles are left; --cut and --fill, where given, bound what is removed.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     genus: Option<u64>,
-    /// Cut or fill, whichever is smaller, instead of cutting first.
+    /// Cut or fill, whichever changes fewer cells, instead of cutting first.
     #[arg(long)]
     cheapest: bool,
     /// Fill cavities of up to this volume, in model units cubed; all or inf: however large.
@@ -113,13 +120,14 @@ impl TopologyArgs {
             ([], true) => Ok(Form::List),
             (_, true) => Err(Error::setting("list", "nothing is written", "leave OUT away")),
             ([], false) => Err(Error::setting("OUT", "no file to write is named", "name one, or add --list")),
-            ([_], false) if options.is_nothing() => {
-                let remedy = "add --cut, --fill, --genus, --cheapest, --fill-cavities or --drop-islands, or --list";
+            ([_], false) if options.is_nothing() && self.sketch.is_none() => {
+                let remedy =
+                    "add --cut, --fill, --genus, --cheapest, --fill-cavities, --drop-islands or --sketch, or --list";
                 Err(Error::setting("topology", "nothing is asked for", remedy))
             }
             ([out], false) => Ok(Form::Write(out, options)),
             ([thin, grow, out], false) => {
-                if !options.is_nothing() {
+                if !options.is_nothing() || self.sketch.is_some() {
                     let problem = "THIN and GROW are sizes already";
                     return Err(Error::setting("cut", problem, "say `zmend topology IN OUT` with options, or none"));
                 }

@@ -23,12 +23,14 @@ Examples:
   zmend extract head.mhd head.ply --iso 41 --drop-islands 500 --fill-cavities all
   zmend extract head.mhd head.sog --iso 41               the signed octree
   zmend extract tissues.vti liver.ply --label 6          one material of a volume of materials
+  zmend extract tissues.vti liver.ply --label 6 --genus 0 --drop-islands 50
 
 Files are MetaImage, NRRD, NIfTI, VTK image data (.vti, .vtk) and SLC; what they contain says which, not their names. The surface lies where \
 the file says the samples are: spacing, origin and directions are honoured. Samples equal to the value are outside, and so is all beyond the volume: \
 the surface is closed there, half a step beyond the last samples.
 
-The surfaces of the labels of a volume fit together without gaps: where two of them touch, both have the same triangles.
+The surfaces of the labels of a volume fit together without gaps: where two of them touch, both have the same triangles. After topology repair they \
+need not.
 
 Topology repair works on cubes along the axes. A volume of other cells is sampled anew for it, with cubes as wide as its closest samples, or as --cell \
 says.")]
@@ -41,12 +43,9 @@ pub(crate) struct ExtractArgs {
     pub(crate) out: PathBuf,
     #[command(flatten)]
     pub(crate) volume: VolumeArgs,
-    /// How the surface is made.
-    #[arg(short, long, value_name = "METHOD", value_enum, default_value_t = MethodArg::Mc, help_heading = "Surface")]
-    pub(crate) method: MethodArg,
-    /// Extract the samples of this value, the number of a material, by surface nets.
-    #[arg(long, value_name = "VALUE", value_parser = coordinate, conflicts_with_all = ["iso", "below", "cell", "method"], help_heading = "Volume")]
-    pub(crate) label: Option<f64>,
+    /// How the surface is made; mc when not given, nets for labels.
+    #[arg(short, long, value_name = "METHOD", value_enum, help_heading = "Surface")]
+    method: Option<MethodArg>,
     /// Leave the surface open where it leaves the volume, with a rim at the last samples.
     #[arg(long, help_heading = "Surface")]
     pub(crate) open: bool,
@@ -74,6 +73,9 @@ pub(crate) struct VolumeArgs {
     /// What is below the value is inside.
     #[arg(long, requires = "iso")]
     pub(crate) below: bool,
+    /// What has this value, the number of a material, is inside.
+    #[arg(long, value_name = "VALUE", value_parser = coordinate, conflicts_with_all = ["iso", "below"], allow_negative_numbers = true)]
+    pub(crate) label: Option<f64>,
     /// Array to read, where a file has several; the first one when not given.
     #[arg(long, value_name = "NAME")]
     array: Option<String>,
@@ -89,6 +91,13 @@ pub(crate) struct VolumeArgs {
     raw: Option<RawLayout>,
 }
 
+impl ExtractArgs {
+    /// How the surface is made.
+    pub(crate) fn method(&self) -> MethodArg {
+        self.method.unwrap_or(if self.volume.label.is_some() { MethodArg::Nets } else { MethodArg::Mc })
+    }
+}
+
 impl VolumeArgs {
     /// What is to be read.
     pub(crate) fn options(&self) -> VolumeOptions {
@@ -99,6 +108,7 @@ impl VolumeArgs {
     pub(crate) fn given(&self) -> Option<&'static str> {
         let given = [
             ("iso", self.iso.is_some()),
+            ("label", self.label.is_some()),
             ("array", self.array.is_some()),
             ("channel", self.channel.is_some()),
             ("spacing", self.spacing.is_some()),

@@ -3,12 +3,6 @@
 use super::*;
 use crate::volume::Cropped;
 
-fn extracted(volume: &impl Volume, options: &ExtractOptions) -> Mesh {
-    let mut mesh = Mesh::default();
-    extract(volume, options, &mut mesh, &Silent).unwrap();
-    mesh
-}
-
 fn by(method: Method) -> ExtractOptions {
     ExtractOptions { method, ..ExtractOptions::default() }
 }
@@ -55,7 +49,7 @@ fn the_last_layer_of_cells_is_there() {
 #[test]
 fn parts_have_the_surface_of_a_copy() {
     let size = [70, 9, 8];
-    let values = random(2, size, 3);
+    let values = random(3, size, 3);
     let whole = Dense::new(&values, size).unwrap();
     let (first, part) = ([3, 2, 1], [66, 6, 7]);
     let copy: Vec<f32> = (0..part.iter().product())
@@ -114,6 +108,29 @@ fn volumes_may_have_more_samples_than_32_bits_count() {
     let report = mesh.report();
     assert_eq!((mesh.validate(), report.components, report.genus), (Ok(()), 1, Some(0)));
     assert!((report.bounds.max - DVec3::new(2046.3, 1022.3, 1038.3)).abs().max_element() < 0.01);
+}
+
+/// Samples and levels went through 32 bits, even where the mesh had 64.
+#[test]
+fn doubles_stay_doubles() {
+    let step = Samples::new([12, 3, 3], |[x, _, _]| 1.0 + 1e-12 * (x as f64 - 5.25));
+    for method in METHODS {
+        let options = ExtractOptions { level: Level::above(1.0), border: Border::Open, ..by(method) };
+        let bounds = extracted(&step, &options).report().bounds;
+        assert!((bounds.min.x - 5.25).abs().max((bounds.max.x - 5.25).abs()) < 1e-3, "{method:?} {bounds:?}");
+    }
+}
+
+/// One extractor began anew with the mesh it was given, another one went on with it.
+#[test]
+fn what_a_mesh_held_is_replaced() {
+    let ball = Samples::new([9; 3], |at| 3.2 - (DVec3::from(at.map(|c| c as f64)) - 4.0).length());
+    for method in METHODS {
+        let once = extracted(&ball, &by(method));
+        let mut twice = once.clone();
+        extract(&(&ball as &dyn Volume), &by(method), &mut twice, &Silent).unwrap();
+        assert!(once == twice, "{method:?}");
+    }
 }
 
 /// Points of slices that were neither the current nor the next one were never set: rows and slices without surface lie between these.

@@ -105,3 +105,19 @@ fn without_features_extended_marching_cubes_is_marching_cubes() {
     // Nor is there anything to decide for the trilinear interpolant.
     assert!(plain == cells(32, ball, Method::Trilinear));
 }
+
+/// Planes have no features, and round surfaces hardly any: there, vertices of dual contouring are on the surface of marching cubes.
+#[test]
+fn without_features_dual_contouring_is_on_marching_cubes() {
+    let slab = |p: DVec3| 5.3 - (p - 15.2).dot(DVec3::new(0.3, -0.5, 0.8).normalize()).abs();
+    let ball = |p: DVec3| 12.2 - (p - DVec3::new(15.1, 15.3, 15.2)).length();
+    let fields: [(&(dyn Fn(DVec3) -> f64 + Sync), f64); 2] = [(&slab, 1e-3), (&ball, 0.08)];
+    for (field, most) in fields {
+        let [plain, dual] = [Method::MarchingCubes, Method::DualContouring].map(|method| {
+            let options = ExtractOptions { method, border: Border::Open, ..ExtractOptions::default() };
+            extracted(&LevelSet::new([32; 3], field), &options)
+        });
+        let (_, worst) = farthest(&plain, &dual.points);
+        assert!(dual.points.len() > 1000 && worst < most, "{worst}");
+    }
+}
