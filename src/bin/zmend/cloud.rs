@@ -37,7 +37,8 @@ pub(crate) fn surface(args: &CloudArgs) -> Result<ExitCode> {
         tell,
     };
     let topology = args.handles.options();
-    solid::run(&Job { input, goal: out, to, work, topology, volume: None, skeleton: None, patches: None })?;
+    let (sketch, volume, skeleton, patches) = (None, None, None, None);
+    solid::run(&Job { input, goal: out, to, work, topology, sketch, volume, skeleton, patches })?;
     Ok(ExitCode::SUCCESS)
 }
 
