@@ -9,7 +9,7 @@ use crate::progress::Progress;
 impl Solid {
     /// The solid whose surface the points of a cloud were taken of; see [`cloud`](crate::cloud). Crossings have normals, for any surface.
     ///
-    /// Cost: for cells as wide as points are apart, some 30 us and 2 kB a point.
+    /// Cost: for cells half as wide as points are apart, some 100 us and 3 kB a point.
     ///
     /// # Errors
     /// As [`Field::of_cloud`].
