@@ -378,7 +378,7 @@ fn the_program_takes_points_and_makes_surfaces_of_them() {
     assert_eq!((json["input"]["had_normals"].as_bool(), json["output"]["euler"].as_i64()), (Some(true), Some(0)));
     assert_eq!(
         json["input"]["points"].as_u64(),
-        Some(folder.bytes("cloud.xyz").iter().filter(|&&b| b == b'\n').count() as u64)
+        Some(fs::read_to_string(folder.0.path().join("cloud.xyz")).expect("text").lines().count() as u64)
     );
 
     fs::write(folder.0.path().join("bad.xyz"), "1 2 3\n4 5\n").expect("written");

@@ -94,7 +94,7 @@ pub(super) fn oriented(
         let mut steps = 0u32;
         while let Some(Link { from, to, .. }) = heap.pop() {
             steps = steps.wrapping_add(1);
-            if steps % 65536 == 0 {
+            if steps.is_multiple_of(65536) {
                 check(progress)?;
             }
             if known[to as usize] {

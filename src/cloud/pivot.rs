@@ -95,7 +95,7 @@ pub fn pivot(cloud: &Cloud, radii: &[f64], progress: &dyn Progress) -> Result<Me
     for radius in radii {
         rolling.roll(radius, progress)?;
     }
-    Ok(separated(&sorted.points, rolling.triangles))
+    Ok(separated(&sorted.points, &rolling.triangles))
 }
 
 impl Rolling<'_> {
@@ -115,7 +115,7 @@ impl Rolling<'_> {
         }
         self.spread(progress)?;
         for point in 0..self.front.len() {
-            if point % PIECE == 0 {
+            if point.is_multiple_of(PIECE) {
                 check(progress)?;
                 progress.advance(PIECE as u64);
             }
@@ -134,7 +134,7 @@ impl Rolling<'_> {
         let mut rolls = 0usize;
         while let Some([from, to]) = self.waiting.pop_front() {
             rolls += 1;
-            if rolls % PIECE == 0 {
+            if rolls.is_multiple_of(PIECE) {
                 check(progress)?;
             }
             if self.sides.contains_key(&[to, from]) {
@@ -258,17 +258,17 @@ impl Rolling<'_> {
 
 /// The mesh of some triangles: without points that none uses, and with a copy of a point for each fan of triangles that meets others only
 /// there.
-fn separated(points: &[DVec3], triangles: Vec<[u32; 3]>) -> Mesh {
+fn separated(points: &[DVec3], triangles: &[[u32; 3]]) -> Mesh {
     // The corner of another triangle at the same point, across the edge that ends there, seen from each corner (three a triangle).
     let seeds = RandomState::with_seeds(1, 6, 1, 8);
     let mut starts: HashMap<[u32; 2], u32, _> = HashMap::with_capacity_and_hasher(3 * triangles.len(), seeds);
-    for (t, triangle) in (0u32..).zip(&triangles) {
+    for (t, triangle) in (0u32..).zip(triangles) {
         for k in 0..3 {
             starts.insert([triangle[k], triangle[(k + 1) % 3]], 3 * t + k as u32);
         }
     }
     let sets = crate::sets::Sets::new(3 * triangles.len());
-    for (t, triangle) in (0u32..).zip(&triangles) {
+    for (t, triangle) in (0u32..).zip(triangles) {
         for k in 0..3usize {
             let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
             if let Some(&other) = starts.get(&[to, from]) {
@@ -281,7 +281,7 @@ fn separated(points: &[DVec3], triangles: Vec<[u32; 3]>) -> Mesh {
     }
     let mut mesh = Mesh::default();
     let mut numbers = vec![u32::MAX; 3 * triangles.len()];
-    for (t, triangle) in (0u32..).zip(&triangles) {
+    for (t, triangle) in (0u32..).zip(triangles) {
         let corners = [0, 1, 2].map(|k| {
             let root = sets.root(3 * t + k as u32) as usize;
             if numbers[root] == u32::MAX {
@@ -344,7 +344,7 @@ mod tests {
         let number = |i: u32| f64::from(i.wrapping_mul(0x9e37_79b9) >> 8) / f64::from(1 << 24);
         let points: Vec<DVec3> =
             (0..400).map(|i| DVec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2))).collect();
-        let mesh = pivot(&Cloud { points, normals: Vec::new() }, &[0.1, 0.3], &Silent).expect("something");
+        let mesh = pivot(&Cloud { points, normals: Vec::new() }, &[0.05, 0.08, 0.12], &Silent).expect("something");
         let report = mesh.report();
         assert!(!mesh.faces.is_empty());
         assert_eq!((report.non_manifold_edges, report.non_manifold_vertices, report.inconsistent_edges), (0, 0, 0));

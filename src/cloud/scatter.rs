@@ -107,7 +107,8 @@ pub fn scatter_into(
     };
     match options.pattern {
         Pattern::Poisson => {
-            faces.darts((expected * DARTS).ceil().max(DARTS) as u64, options.seed, &mut offer, progress)?
+            let darts = (expected * DARTS).ceil().max(DARTS) as u64;
+            faces.darts(darts, options.seed, &mut offer, progress)?;
         }
         Pattern::Regular => faces.rows(spacing, &mut offer, progress)?,
     }
@@ -160,7 +161,7 @@ impl<'a> Faces<'a> {
         let bits = count.next_power_of_two().trailing_zeros().max(2);
         let area = self.ends.last().copied().unwrap_or(0.0);
         for i in 0..1u64 << bits {
-            if i % PIECE == 0 {
+            if i.is_multiple_of(PIECE) {
                 check(progress)?;
             }
             let dart = shuffled(i, bits);
@@ -177,7 +178,7 @@ impl<'a> Faces<'a> {
                 (u, v) = (1.0 - u, 1.0 - v);
             }
             offer(a + u * (b - a) + v * (c - a), (b - a).cross(c - a).normalize())?;
-            if dart % PIECE == 0 {
+            if dart.is_multiple_of(PIECE) {
                 progress.advance(PIECE);
             }
         }
@@ -201,7 +202,7 @@ impl<'a> Faces<'a> {
             let (apex, left, right) = shortest.expect("three sides");
             let rows = steps(apex.distance(left).max(apex.distance(right)));
             for row in 0..=rows {
-                if row % 64 == 0 {
+                if row.is_multiple_of(64) {
                     check(progress)?;
                 }
                 let along = row as f64 / rows as f64;

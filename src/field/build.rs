@@ -238,8 +238,7 @@ fn splits(frame: &Frame, function: &impl Function, cells: &[Key], adapt: &Adapt)
         let off = |value: f64, mean: f64| (value - mean).abs();
         let faces = (0..6).map(|f| off(values[8 + f], mean_of(&|c| c >> (2 - f / 2) & 1 == f % 2)));
         let worst = faces.fold(off(values[PLACES - 1], mean_of(&|_| true)), f64::max);
-        // One that is no number, too.
-        !(worst <= adapt.tolerance)
+        worst.is_nan() || worst > adapt.tolerance
     };
     cells.iter().zip(values.chunks_exact(PLACES)).map(is_split).collect()
 }

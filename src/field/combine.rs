@@ -88,7 +88,7 @@ impl Field {
             crease(a, b)
         };
         let has_crease = |field: &Field, leaf: Key| {
-            let signs = leaf.corners().map(|point| at_node(point));
+            let signs = leaf.corners().map(&at_node);
             let (least, most) =
                 signs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &s| (a.min(s), b.max(s)));
             least <= 0.0 && most >= 0.0 && field.is_mixed(leaf)

@@ -54,15 +54,19 @@ pub trait Function: Sync {
         let mut ranges: Vec<(Edge, [f64; 2])> = edges.iter().map(|edge| (*edge, [0.0, 1.0])).collect();
         let (mut places, mut values) = (Vec::new(), Vec::new());
         let mut at: Vec<f64> = edges.iter().map(Edge::linear).collect();
+        let mut last: Vec<Option<usize>> = vec![None; edges.len()];
         for _ in 0..CUTS {
             places.clear();
             places.extend(edges.iter().zip(&at).map(|(edge, &at)| edge.place(at)));
             values.clear();
             self.values(&places, &mut values);
-            for (((now, range), at), &value) in ranges.iter_mut().zip(&mut at).zip(&values) {
+            let cuts = ranges.iter_mut().zip(&mut last).zip(&mut at).zip(&values);
+            for ((((now, range), last), at), &value) in cuts {
                 let end = usize::from((value < 0.0) != (now.values[0] < 0.0));
-                // The end that stays weighs half, so that both come nearer (the Illinois way, Dowell and Jarratt 1971).
-                now.values[1 - end] *= 0.5;
+                if last.replace(end) == Some(end) {
+                    // The end that stays again weighs half, so that both come nearer (the Illinois way, Dowell and Jarratt 1971).
+                    now.values[1 - end] *= 0.5;
+                }
                 (now.values[end], range[end]) = (value, *at);
                 *at = range[0] + (range[1] - range[0]) * now.linear();
             }

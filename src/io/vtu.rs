@@ -16,6 +16,9 @@ const HEXAHEDRON: u8 = 12;
 /// Numbers encoded at a time.
 const PIECE: usize = 1 << 14;
 
+/// Pushes a number of an array, as text or in bytes.
+type Push<'a> = Box<dyn Fn(usize, bool, &mut Out) + 'a>;
+
 /// An array of the file: how it is named, and its numbers.
 struct Array<'a> {
     name: &'static str,
@@ -24,7 +27,7 @@ struct Array<'a> {
     size: usize,
     components: usize,
     len: usize,
-    push: Box<dyn Fn(usize, bool, &mut Out) + 'a>,
+    push: Push<'a>,
 }
 
 impl<'a> Array<'a> {

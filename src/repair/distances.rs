@@ -16,6 +16,7 @@ use rayon::prelude::*;
 const BATCH: usize = 512;
 
 /// Which cells are made of a solid.
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CellOptions {
     /// The largest cells have this level, 0 to the octree's depth. Default 3: an eighth of the root's side.

@@ -32,9 +32,8 @@ pub(crate) fn run(args: &OctmeshArgs) -> Result<ExitCode> {
         solid = solid.mended(&topology, &bars)?.0.told_by_signs()?;
     }
     let is_cells = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"));
-    let (bytes, counts) = interrupt::noted(|| match is_cells {
-        true => cells(args, &solid, surface, &bars),
-        false => samples(args, &solid, surface, &bars),
+    let (bytes, counts) = interrupt::noted(|| {
+        if is_cells { cells(args, &solid, surface, &bars) } else { samples(args, &solid, surface, &bars) }
     })?;
     drop(bars);
     if work.tell.quiet {
