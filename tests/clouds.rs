@@ -124,7 +124,11 @@ fn a12_vertical_walls_far_from_the_origin_have_planes() {
 /// Marching cubes without a rule for ambiguous faces, skipped cells and unshared vertices made a soup with holes. Here anything is closed.
 #[test]
 fn a14_whatever_the_points_the_surface_is_closed() {
-    let number = |i: u64| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / f64::from(1 << 24);
+    let number = |i: u64| {
+        let mixed = (i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mixed = (mixed ^ mixed >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        ((mixed ^ mixed >> 31) >> 40) as f64 / f64::from(1 << 24)
+    };
     let chaos: Vec<DVec3> = (0..800).map(|i| DVec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2))).collect();
     let sheet: Vec<DVec3> = chaos.iter().map(|p| p.with_z(0.5)).collect();
     let line: Vec<DVec3> = chaos.iter().map(|p| DVec3::splat(p.x)).collect();

@@ -299,6 +299,7 @@ fn separated(points: &[DVec3], triangles: &[[u32; 3]]) -> Mesh {
 mod tests {
     use super::*;
     use crate::cloud::{ScatterOptions, scatter};
+    use crate::mesh::chance::Chance;
     use crate::mesh::sample;
     use crate::progress::Silent;
 
@@ -341,9 +342,8 @@ mod tests {
 
     #[test]
     fn chaos_gives_a_manifold_too() {
-        let number = |i: u32| f64::from(i.wrapping_mul(0x9e37_79b9) >> 8) / f64::from(1 << 24);
-        let points: Vec<DVec3> =
-            (0..400).map(|i| DVec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2))).collect();
+        let mut chance = Chance(5);
+        let points: Vec<DVec3> = (0..400).map(|_| DVec3::new(chance.unit(), chance.unit(), chance.unit())).collect();
         let mesh = pivot(&Cloud { points, normals: Vec::new() }, &[0.05, 0.08, 0.12], &Silent).expect("something");
         let report = mesh.report();
         assert!(!mesh.faces.is_empty());
