@@ -35,7 +35,8 @@
 //! # What it does not promise
 //!
 //! - **The surface is made anew.** It lies within about a cell of the input, but it shares no vertices with it. What is thinner than a
-//!   cell may vanish or grow together: take a greater [`depth`](Options::depth).
+//!   cell may vanish or grow together: take a greater [`depth`](Options::depth). ([`repair_keeping_good`] keeps whole components that are good
+//!   or can be healed.)
 //! - **Open sheets vanish.** A surface that encloses nothing, such as a lone rectangle, has no inside, unless it is
 //!   [thickened](Options::thicken).
 //! - **Unions ask for orientation.** Solids that overlap become their union, and holes are closed by a smooth surface, if faces are turned
@@ -51,7 +52,7 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink |
+//! | [`repair`](mod@repair) | the pipeline: [`repair()`](repair::repair) in memory, [`repair_into`] from any source into any sink, [`repair_keeping_good`] only where it must be |
 //! | [`mesh`] | [`Mesh`], reports and validation, neighbourhoods ([`Topology`](mesh::Topology)), features, local repairs ([`Mesh::heal`]), editing ([`Edit`](mesh::Edit)), self-intersections, distances between surfaces, sources and sinks of meshes that pass by, broken samples to try |
 //! | [`io`] | meshes: STL, PLY, OBJ, OFF, glTF and 3MF; octrees: SOF, SOG and DCF; [volumes](io::volume): `MetaImage`, NRRD, `NIfTI`, VTI, VTK, SLC |
 //! | [`sign`] | triangles to crossings, crossings without holes, inside and outside |
@@ -115,8 +116,8 @@ pub use error::{Error, Place, Result};
 pub use glam;
 pub use mesh::{Mesh, Polygons};
 pub use repair::{
-    Faces, Inside, Keep, Offset, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into,
-    solidify,
+    Faces, Inside, Keep, Mended, Offset, Options, RepairReport, Repaired, Solid, Surface, Thicken, repair, repair_into,
+    repair_keeping_good, solidify,
 };
 
 /// The examples of the README are tests.

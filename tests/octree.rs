@@ -1,6 +1,8 @@
 //! The octree as a library of its own, from outside: what octrees of this kind got wrong before, each as a test, and a tree of a quarter
 //! of a billion leaves.
 
+mod pointer;
+
 use std::collections::BTreeSet;
 use std::time::Instant;
 

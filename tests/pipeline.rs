@@ -8,7 +8,7 @@ mod common;
 
 use common::{Topology, check_repaired, data, files, name, surfaces};
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use zmend::progress::Silent;
 use zmend::{Inside, Mesh, Options, RepairReport, Repaired, Solid, Surface, io, repair, solidify};
@@ -125,7 +125,16 @@ fn sweep_all(depths: &[u32], rules: &[Inside]) {
     let Some(data) = data() else { return };
     let files = files(&data);
     let start = Instant::now();
-    let outcomes: Vec<Outcome> = files.par_iter().map(|path| sweep(path, depths, rules)).collect();
+    // Sweeps that somebody asks for take long, and say how far they are.
+    let is_asked_for = std::env::var_os("ZMEND_SWEEP_DEPTHS").is_some();
+    let told = |path: &PathBuf| {
+        let outcome = sweep(path, depths, rules);
+        if is_asked_for {
+            println!("{}: {} repairs in {:.1} s", name(path), outcome.repairs, outcome.took.as_secs_f64());
+        }
+        outcome
+    };
+    let outcomes: Vec<Outcome> = files.par_iter().map(told).collect();
     let sum = |count: fn(&Outcome) -> usize| outcomes.iter().map(count).sum::<usize>();
     let refused: Vec<String> =
         files.iter().zip(&outcomes).filter(|(_, o)| o.refused.is_some()).map(|(path, _)| name(path)).collect();

@@ -7,6 +7,7 @@ use common::data;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use zmend::geom::Frame;
 use zmend::glam::DVec3;
@@ -407,11 +408,13 @@ fn a_sketch_says_what_the_topology_is() {
     let folder = folder.path();
     let ring = solid(6, |p| torus(p, MIDDLE, DVec3::Z, 0.3, 0.1));
     io::write_sof(folder.join("ring.sof"), ring.signed(), &Silent).unwrap();
-    let on_circle = |i: u32| {
-        MIDDLE + 0.3 * DVec3::new(f64::cos(TAU * f64::from(i) / 16.0), f64::sin(TAU * f64::from(i) / 16.0), 0.0)
-    };
-    let points: String = (0..16).map(on_circle).map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
-    let circle: String = (0..16).map(|i| format!("l {} {}\n", i + 1, (i + 1) % 16 + 1)).collect();
+    let (mut points, mut circle) = (String::new(), String::new());
+    for i in 1..=16 {
+        let (sin, cos) = (TAU * f64::from(i) / 16.0).sin_cos();
+        let p = MIDDLE + 0.3 * DVec3::new(cos, sin, 0.0);
+        writeln!(points, "v {} {} {}", p.x, p.y, p.z).unwrap();
+        writeln!(circle, "l {i} {}", i % 16 + 1).unwrap();
+    }
     for (name, lines, genus, cuts) in [
         ("dot.obj", "l 1 2\nl 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16\n".to_owned(), 0, 1),
         ("circle.axs", format!("{circle}s 0\no\n"), 1, 0),

@@ -67,7 +67,7 @@ pub use octree::{
 };
 pub use points::{CloudFormat, CloudWriter, read_cloud, read_cloud_bytes, write_cloud};
 pub use vtu::write_vtu;
-pub use write::{WriteOptions, Writer, create, write};
+pub use write::{WriteOptions, Writer, create, write, write_as};
 
 use crate::error::{Error, Place, Result};
 use crate::mesh::Mesh;

@@ -143,8 +143,7 @@ pub fn write_patches(path: impl AsRef<Path>, patches: &Patches) -> Result<u64> {
     check_corners(path, "face", patches.points.len(), patches.quads.iter().map(|(corners, _)| &corners[..]))?;
     let mut text = Text::create(path)?;
     if is_ply {
-        let faces = format!("element face {}\nproperty list uchar int vertex_indices\n{COLOUR}", patches.quads.len());
-        text.ply_points(&patches.points, &faces)?;
+        text.ply_points(&patches.points, &patch_elements(patches.quads.len()))?;
         for (corners, colour) in &patches.quads {
             let [a, b, c, d] = corners.map(u32::to_le_bytes);
             text.put(&[&[4][..], &a, &b, &c, &d, colour].concat())?;
@@ -156,6 +155,65 @@ pub fn write_patches(path: impl AsRef<Path>, patches: &Patches) -> Result<u64> {
         text.put(format!("f {} {} {} {}\n", a + 1, b + 1, c + 1, d + 1).as_bytes())?;
     }
     text.finish()
+}
+
+/// Bytes of a point, and of a quadrilateral with its colour.
+const SIZES: [usize; 2] = [12, 20];
+
+/// Reads quadrilaterals with their colours from a PLY file that [`write_patches`] has written.
+///
+/// # Errors
+/// When the file cannot be read, or is any other file.
+pub fn read_patches(path: impl AsRef<Path>) -> Result<Patches> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    parse_patches(&bytes).ok_or_else(|| {
+        let problem = "this is no PLY file of patches";
+        Error::format(path.display().to_string(), Place::Whole, problem, "`zmend topology --patches` writes such files")
+    })
+}
+
+/// The patches that a file holds, if it is as [`write_patches`] writes it, to the byte.
+fn parse_patches(bytes: &[u8]) -> Option<Patches> {
+    const END: &[u8] = b"end_header\n";
+    let head = bytes.windows(END.len()).take(CHUNK).position(|here| here == END)? + END.len();
+    let (head, body) = (std::str::from_utf8(&bytes[..head]).ok()?, &bytes[head..]);
+    let count = |element: &str| head.lines().find_map(|line| line.strip_prefix(element)?.parse::<usize>().ok());
+    let (points, quads) = (count("element vertex ")?, count("element face ")?);
+    let sizes = [points.checked_mul(SIZES[0])?, quads.checked_mul(SIZES[1])?];
+    if head != ply_header(points, &patch_elements(quads)) || sizes[0].checked_add(sizes[1])? != body.len() {
+        return None;
+    }
+    let (of_points, of_quads) = body.split_at(sizes[0]);
+    let point = |bytes: &[u8; SIZES[0]]| DVec3::from_slice(&floats(bytes));
+    let quad = |bytes: &[u8; SIZES[1]]| {
+        let corners: [u32; 4] =
+            std::array::from_fn(|k| u32::from_le_bytes(std::array::from_fn(|b| bytes[1 + 4 * k + b])));
+        let is_sound = bytes[0] == 4 && corners.iter().all(|&corner| (corner as usize) < points);
+        is_sound.then_some((corners, [bytes[17], bytes[18], bytes[19]]))
+    };
+    Some(Patches {
+        points: of_points.as_chunks().0.iter().map(point).collect(),
+        quads: of_quads.as_chunks().0.iter().map(quad).collect::<Option<_>>()?,
+    })
+}
+
+fn floats(bytes: &[u8; SIZES[0]]) -> [f64; 3] {
+    std::array::from_fn(|k| f64::from(f32::from_le_bytes(std::array::from_fn(|b| bytes[4 * k + b]))))
+}
+
+/// The faces of a PLY file of patches, as its header says.
+fn patch_elements(quads: usize) -> String {
+    format!("element face {quads}\nproperty list uchar int vertex_indices\n{COLOUR}")
+}
+
+/// The header of a binary PLY file; `behind` is what comes after its points.
+fn ply_header(points: usize, behind: &str) -> String {
+    let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment zmend\nelement vertex {points}\n");
+    for axis in ["x", "y", "z"] {
+        let _ = writeln!(header, "property float {axis}");
+    }
+    header + behind + "end_header\n"
 }
 
 /// The properties of a colour in the header of a PLY file.
@@ -213,14 +271,7 @@ impl Text {
 
     /// A binary PLY file up to the end of its points; `behind` is the rest of the header.
     fn ply_points(&mut self, points: &[DVec3], behind: &str) -> Result<()> {
-        let mut header =
-            format!("ply\nformat binary_little_endian 1.0\ncomment zmend\nelement vertex {}\n", points.len());
-        for axis in ["x", "y", "z"] {
-            let _ = writeln!(header, "property float {axis}");
-        }
-        header.push_str(behind);
-        header.push_str("end_header\n");
-        self.put(header.as_bytes())?;
+        self.put(ply_header(points.len(), behind).as_bytes())?;
         points.iter().try_for_each(|p| self.put(p.as_vec3().to_array().map(f32::to_le_bytes).as_flattened()))
     }
 
@@ -303,6 +354,15 @@ mod tests {
             assert_eq!(mesh.points, points);
             assert!(mesh.faces.iter().eq(patches.quads.iter().map(|q| &q.0[..])));
         }
+        let bytes = written("a.ply", |path| write_patches(path, &patches));
+        assert_eq!(parse_patches(&bytes).as_ref(), Some(&patches));
+        // Any byte too few, any index too great.
+        assert!((0..bytes.len()).all(|len| parse_patches(&bytes[..len]).is_none()));
+        let mut wrong = bytes.clone();
+        let last = wrong.len() - 4;
+        wrong[last] = 1;
+        assert!(parse_patches(&wrong).is_none() && parse_patches(b"end_header\n").is_none());
+        assert!(read_patches("no such file").is_err());
     }
 
     #[test]

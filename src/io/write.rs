@@ -101,6 +101,14 @@ pub fn write(path: impl AsRef<Path>, mesh: &Mesh, options: WriteOptions) -> Resu
         let remedy = format!("give it a name that ends in {NAMES}");
         Error::format(path.display().to_string(), Place::Whole, "the name says no format to write", remedy)
     })?;
+    write_as(path, format, mesh, options)
+}
+
+/// Writes a mesh in a format, whatever the name says, and returns the size of the file. Faces without any corner are left out.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_as(path: impl AsRef<Path>, format: Format, mesh: &Mesh, options: WriteOptions) -> Result<u64> {
     let most_corners = mesh.faces.iter().map(<[u32]>::len).max().unwrap_or(0);
     let mut writer = create(path, format, WriteOptions { most_corners, ..options })?;
     pass_on(mesh, &mut writer)?;

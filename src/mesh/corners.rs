@@ -118,6 +118,11 @@ impl<'a> Corners<'a> {
         self.mesh
     }
 
+    /// Whether all faces are triangles.
+    pub(super) fn are_triangles(&self) -> bool {
+        matches!(self.faces, FaceOf::Triangles)
+    }
+
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
         let faces = if let FaceOf::Mixed(faces) = &self.faces { faces.len() } else { 0 };

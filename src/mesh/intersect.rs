@@ -5,11 +5,12 @@
 //! exactly. Pairs of nodes some levels below the root are independent pieces of work for all threads.
 //!
 //! Nodes whose boxes are nearly empty, which is what bundles of long thin triangles have, are told apart by boxes that lie along them
-//! ([`Slivers`]).
+//! ([`Slivers`]), and nodes of triangles around one point, whose boxes all hold it, by cones ([`Fans`]).
 //!
-//! Cost: O(n log n), but for triangles that are long in several directions where many others are, and for fans: the triangles around
-//! one point all have boxes that hold it, so a fan of n triangles takes n²/8 comparisons. Beside the tree, eight bytes a pair found.
+//! Cost: O(n log n), but for triangles that are long in several directions where many others are, and for books: many triangles along
+//! one edge. Beside the tree, eight bytes a pair found.
 
+use super::fans::Fans;
 use super::meet::{Triangle, meet};
 use super::oriented::Slivers;
 use super::tree::{TriangleTree, around};
@@ -60,17 +61,18 @@ impl Mesh {
     }
 
     /// [`self_intersections_up_to`](Self::self_intersections_up_to), but only pairs of which one is face `from` or a later one.
-    pub(super) fn intersections_from(&self, from: u32, limit: usize) -> Option<Vec<[u32; 2]>> {
+    pub(crate) fn intersections_from(&self, from: u32, limit: usize) -> Option<Vec<[u32; 2]>> {
         let tree = TriangleTree::new(self);
-        let slivers = Slivers::new(&tree);
+        let (slivers, fans) = (Slivers::new(&tree), Fans::new(&tree));
+        let is_apart = |a: u32, b: u32| slivers.are_apart(&tree, a, b) || fans.are_apart(a, b);
         let mut pieces = Vec::new();
-        descend(&tree, &slivers, tree.height().min(PIECES), 1, 1, &mut |a, b| pieces.push([a, b]));
+        descend(&tree, &is_apart, tree.height().min(PIECES), 1, 1, &mut |a, b| pieces.push([a, b]));
         let found = AtomicUsize::new(0);
         let in_piece = |&[a, b]: &[u32; 2]| {
             let mut join =
                 Join { tree: &tree, from, limit, found: &found, pairs: Vec::new(), near: [Vec::new(), Vec::new()] };
             if !join.is_over() {
-                descend(&tree, &slivers, tree.height(), a, b, &mut |a, b| join.leaves(a, b));
+                descend(&tree, &is_apart, tree.height(), a, b, &mut |a, b| join.leaves(a, b));
             }
             join.pairs
         };
@@ -85,10 +87,10 @@ impl Mesh {
     }
 }
 
-/// Calls `visit` with every pair of nodes on a level, below two nodes of the same level, whose boxes overlap.
+/// Calls `visit` with every pair of nodes on a level, below two nodes of the same level, whose boxes overlap and that are not apart.
 pub(super) fn descend(
     tree: &TriangleTree<'_>,
-    slivers: &Slivers,
+    is_apart: &impl Fn(u32, u32) -> bool,
     level: u32,
     a: u32,
     b: u32,
@@ -101,8 +103,8 @@ pub(super) fn descend(
     let children: &[(u32, u32)] = if a == b { &[(0, 0), (0, 1), (1, 1)] } else { &[(0, 0), (0, 1), (1, 0), (1, 1)] };
     for (i, j) in children {
         let (a, b) = (2 * a + i, 2 * b + j);
-        if a == b || (overlap(tree.bounds(a), tree.bounds(b)) && !slivers.are_apart(tree, a, b)) {
-            descend(tree, slivers, level, a, b, visit);
+        if a == b || (overlap(tree.bounds(a), tree.bounds(b)) && !is_apart(a, b)) {
+            descend(tree, is_apart, level, a, b, visit);
         }
     }
 }

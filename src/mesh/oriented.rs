@@ -183,7 +183,8 @@ mod tests {
         let tree = TriangleTree::new(mesh);
         [Slivers::new(&tree), Slivers::default()].map(|slivers| {
             let mut count = 0;
-            super::super::intersect::descend(&tree, &slivers, tree.height(), 1, 1, &mut |a, b| {
+            let is_apart = |a: u32, b: u32| slivers.are_apart(&tree, a, b);
+            super::super::intersect::descend(&tree, &is_apart, tree.height(), 1, 1, &mut |a, b| {
                 count += usize::from(a != b);
             });
             count

@@ -378,6 +378,30 @@ mod tests {
         check_area(&points, &[0, 1, 2, 3, 0, 4, 7, 6, 5, 4]);
     }
 
+    /// Polygons that are not planar, as modellers write them: triangles all look where the polygon does, and none is a needle.
+    #[test]
+    fn bent_polygons_are_cut_without_folds() {
+        for n in [4u32, 5, 6, 12, 40] {
+            for wave in [0.05, 0.2, 0.4] {
+                let corner = |i: u32| {
+                    let turn = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+                    DVec3::new(turn.cos(), turn.sin(), wave * (2.0 * turn).sin())
+                };
+                let points: Vec<DVec3> = (0..n).map(corner).collect();
+                let mut cut = Vec::new();
+                triangulate(&points, &all(&points), &mut cut);
+                assert_eq!(cut.len(), n as usize - 2);
+                let normals =
+                    || cut.iter().map(|t| t.map(|i| points[i as usize])).map(|[a, b, c]| (b - a).cross(c - a));
+                assert!(normals().all(|normal| normal.z > 0.0), "{n} {wave}");
+                // As large as seen from above, and by the slope a little larger.
+                let (flat, area) = (normals().map(|n| n.z).sum::<f64>(), normals().map(DVec3::length).sum::<f64>());
+                assert!((flat - f64::from(n) * (std::f64::consts::TAU / f64::from(n)).sin()).abs() < 1e-12);
+                assert!(area < flat * (1.0 + 4.0 * wave * wave), "{n} {wave}: {area} over {flat}");
+            }
+        }
+    }
+
     #[test]
     fn corners_without_a_place_spoil_one_triangle_each() {
         let mut points = star(&[1.0; 12], 0.3);

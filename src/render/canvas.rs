@@ -175,6 +175,10 @@ pub(super) struct Marks {
 /// Marks are seen as if they were this much nearer, in samples; edges in front of faces.
 const MARK_SHIFT: [f64; 2] = [0.5, 4.0];
 
+/// What is laid over is seen as if it were this much nearer, in samples: more than any picture is deep, and little enough for depths to keep
+/// a hundredth of a sample.
+const OVER: f32 = 65_536.0;
+
 /// Strips along the marked edges, `width` samples wide, and the marked faces in another colour.
 fn mark_patches(mesh: &Mesh, points: &[DVec3], marks: &Marks, width: f64) -> Vec<Patch> {
     let point = |i: u32| points.get(i as usize).copied().unwrap_or(DVec3::NAN);
@@ -240,6 +244,18 @@ impl Canvas {
         self.fill(&[mark_patches(mesh, points, marks, width)], None);
     }
 
+    /// Fills triangles over placed points with a colour each (linear light), in front of all else and as near to the eye as they are to
+    /// each other.
+    pub(super) fn lay_over(&mut self, triangles: &[([DVec3; 3], Vec3)]) {
+        let patch = |(corners, base): &([DVec3; 3], Vec3)| {
+            let patch = Patch::new(*corners, 0)?;
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(DVec3::Z).as_vec3();
+            let light = shade(if normal.z < 0.0 { -normal } else { normal }, *base);
+            Some(Patch { light, depth: patch.depth.map(|depth| depth + OVER), ..patch })
+        };
+        self.fill(&[triangles.iter().filter_map(patch).collect()], None);
+    }
+
     fn fill(&mut self, patches: &[Vec<Patch>], wire: Option<f32>) {
         let rows = self.height.div_ceil(2 * rayon::current_num_threads());
         let width = self.width;
@@ -293,6 +309,15 @@ pub(super) fn encode(light: f32) -> u8 {
     let light = light.clamp(0.0, 1.0);
     let value = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
     (255.0 * value + 0.5) as u8
+}
+
+/// The light of an sRGB colour.
+pub(super) fn decode(colour: [u8; 3]) -> Vec3 {
+    let light = |value: u8| {
+        let value = f32::from(value) / 255.0;
+        if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+    };
+    Vec3::from(colour.map(light))
 }
 
 /// Means over windows of `2 * radius + 1` values; there is nothing beyond the ends.

@@ -113,6 +113,20 @@ impl Image {
 /// # Ok::<(), zmend::Error>(())
 /// ```
 pub fn render(meshes: &[&Mesh], view: &View) -> Image {
+    render_with(meshes, &[], view)
+}
+
+/// A quadrilateral in a colour of its own: a membrane of a cut or a fill.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Membrane {
+    /// The corners, in model units.
+    pub corners: [DVec3; 4],
+    /// Red, green, blue (sRGB).
+    pub colour: [u8; 3],
+}
+
+/// [`render`], and membranes over each of the meshes, seen through them.
+pub fn render_with(meshes: &[&Mesh], membranes: &[Membrane], view: &View) -> Image {
     let (width, height, fine) = (view.width.max(1), view.height.max(1), view.supersample.clamp(1, 8));
     let camera = Camera::new(view);
     let panels = meshes.len().max(1) as u32;
@@ -140,6 +154,12 @@ pub fn render(meshes: &[&Mesh], view: &View) -> Image {
                 if view.defects {
                     canvas.mark(mesh, &placed, &defects::marks(mesh), MARK_WIDTH * f64::from(fine));
                 }
+                let place = |p: DVec3| (camera.project(p) - center) * scale + middle;
+                let halves = |membrane: &Membrane| {
+                    let ([a, b, c, d], light) = (membrane.corners.map(place), canvas::decode(membrane.colour));
+                    [([a, b, c], light), ([a, c, d], light)]
+                };
+                canvas.lay_over(&membranes.iter().flat_map(halves).collect::<Vec<_>>());
             }
             canvas.shrink(fine as usize)
         })
@@ -224,6 +244,22 @@ mod tests {
     fn flipped(mesh: &Mesh) -> Mesh {
         let faces = mesh.faces.iter().map(|f| f.iter().rev().copied().collect::<Vec<_>>()).collect::<Vec<_>>();
         Mesh { points: mesh.points.clone(), faces: faces.iter().map(|f| &f[..]).collect::<Polygons>() }
+    }
+
+    #[test]
+    fn membranes_are_seen_through_the_mesh() {
+        let ball = sample::build("sphere", 2).unwrap();
+        let square = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, z]| 0.2 * DVec3::new(x, 0.0, z));
+        let membranes = [Membrane { corners: square, colour: [5, 200, 30] }];
+        let view = View { azimuth: -90.0, elevation: 0.0, ..small() };
+        let [plain, marked] = [&membranes[..0], &membranes].map(|membranes| render_with(&[&ball], membranes, &view));
+        assert_eq!(plain, render(&[&ball], &view));
+        let pairs = || plain.rgb.as_chunks::<3>().0.iter().zip(marked.rgb.as_chunks::<3>().0);
+        let changed: Vec<_> = pairs().filter(|(a, b)| a != b).map(|(_, b)| b).collect();
+        // A fifth of the ball's diameter, which is nine tenths of the height.
+        let expected = (0.2f64 * 0.9 * 300.0).powi(2);
+        assert!((changed.len() as f64 / expected - 1.0).abs() < 0.05, "{} for {expected}", changed.len());
+        assert!(changed.iter().all(|[r, g, b]| g > r && g > b));
     }
 
     #[test]

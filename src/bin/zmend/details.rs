@@ -33,6 +33,7 @@ impl Details {
         table.line("faces turned over", &[rare(d.faces_to_turn)]);
         table.line("spikes", &[rare(d.spikes)]);
         table.line("edges from a vertex to itself", &[rare(d.self_edges)]);
+        table.line("faces that are not planar", &[rare(d.bent_faces)]);
         table.line("sharp edges, outwards", &[rare(self.sharp[0])]);
         table.line("sharp edges, inwards", &[rare(self.sharp[1])]);
     }
@@ -69,6 +70,7 @@ impl Details {
             "faces_turned_over": d.faces_to_turn,
             "spikes": d.spikes,
             "self_edges": d.self_edges,
+            "bent_faces": d.bent_faces,
             "rims": d.loops.len(),
             "longest_rims": self.longest().iter().map(rim).collect::<Vec<_>>(),
             "sharp_edges_outwards": self.sharp[0],

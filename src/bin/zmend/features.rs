@@ -15,7 +15,7 @@ const COLOURS: [skeleton::Colour; 4] = [[202, 0, 32], [5, 113, 176], [26, 150, 6
 const KINDS: [&str; 4] = ["folds outwards", "folds inwards", "ends", "branches"];
 
 pub(crate) fn run(args: &FeaturesArgs) -> Result<ExitCode> {
-    goal::check(&args.out, &[&args.input], args.force)?;
+    goal::check(&args.out, &[&args.input], args.output.force)?;
     let mesh = io::read(&args.input)?;
     let topology = Topology::new(&mesh);
     let others = !args.folds_only;
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &FeaturesArgs) -> Result<ExitCode> {
     }
     lines.drop_unused_points();
     let bytes = interrupt::noted(|| skeleton::write_polylines(&args.out, &lines))?;
-    if args.json {
+    if args.output.json {
         let path = args.out.display().to_string();
         print::out(&format!(
             "{}\n",

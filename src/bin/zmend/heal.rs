@@ -8,13 +8,13 @@ use crate::{convert, goal};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::process::ExitCode;
-use zmend::mesh::{Defects, HealOptions, Healed};
+use zmend::mesh::{Defects, HealOptions, HealStep};
 use zmend::{Result, io};
 
 pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
     goal::mesh_format(&args.out)?;
-    goal::check(&args.out, &[&args.input], args.force)?;
-    let bars = Bars::new(!args.json);
+    goal::check(&args.out, &[&args.input], args.output.force)?;
+    let bars = Bars::new(!args.output.json);
     bars.start("read", 0);
     let mesh = io::read(&args.input)?;
     let (tolerance, is_absolute) = match args.tolerance {
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
     bars.start("write", 0);
     let bytes = convert::write(&args.out, &healed.mesh, false)?;
     drop(bars);
-    if args.json {
+    if args.output.json {
         let told = json!({
             "path": args.out.display().to_string(),
             "bytes": bytes,
@@ -40,33 +40,39 @@ pub(crate) fn run(args: &HealArgs) -> Result<ExitCode> {
             "faces": healed.mesh.faces.len(),
             "before": as_json(&healed.before),
             "after": as_json(&healed.after),
-            "steps": healed.steps.iter().map(|s| json!({ "name": s.name, "count": s.count, "undone": s.is_undone }))
-                .collect::<Vec<_>>(),
+            "steps": steps_json(&healed.steps),
         });
         print::out(&format!("{told}\n"))?;
     } else {
         let written = convert::told(&args.out, &healed.mesh, bytes);
-        print::out(&format!("{}{written}\n{}\n", table(&healed), verdict(&healed)))?;
+        let is_healed = healed.after.is_none();
+        let told = table([&healed.before, &healed.after], &healed.steps);
+        print::out(&format!("{told}{written}\n{}\n", verdict(is_healed, healed.steps.is_empty())))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(defects: &Defects) -> Value {
+pub(crate) fn as_json(defects: &Defects) -> Value {
     let mut object: Map<String, Value> =
         defects.counts()[..11].iter().map(|(name, n)| (name.replace([' ', '-'], "_"), json!(n))).collect();
     object.insert("self_intersections".to_owned(), json!(defects.self_intersections));
     Value::Object(object)
 }
 
-fn table(healed: &Healed) -> String {
+pub(crate) fn steps_json(steps: &[HealStep]) -> Value {
+    steps.iter().map(|s| json!({ "name": s.name, "count": s.count, "undone": s.is_undone })).collect()
+}
+
+/// Defects before and after, and what was done.
+pub(crate) fn table(defects: [&Defects; 2], steps: &[HealStep]) -> String {
     let mut table = Table::default();
-    let (before, after) = (healed.before.counts(), healed.after.counts());
+    let [before, after] = defects.map(Defects::counts);
     let found: Vec<usize> = (0..11).filter(|&i| before[i].1 + after[i].1 > 0).collect();
     let most = Defects::MOST as u64;
     let words = |defects: &Defects| {
         defects.self_intersections.map(|n| if n > most { format!("over {}", count(most)) } else { count(n) })
     };
-    let crosses = [&healed.before, &healed.after].iter().any(|d| d.self_intersections.is_some_and(|n| n > 0));
+    let crosses = defects.iter().any(|d| d.self_intersections.is_some_and(|n| n > 0));
     if !found.is_empty() || crosses {
         table.line("", &["before", "after"].map(|name| Some(name.to_owned())));
     }
@@ -74,10 +80,10 @@ fn table(healed: &Healed) -> String {
         table.line(before[i].0, &[before[i].1, after[i].1].map(|n| Some(count(n))));
     }
     if crosses {
-        table.line("self-intersections", &[&healed.before, &healed.after].map(words));
+        table.line("self-intersections", &defects.map(words));
     }
     let mut text = table.to_string();
-    for step in &healed.steps {
+    for step in steps {
         let undone = if step.is_undone { " (undone: something else was worse for it)" } else { "" };
         let _ = writeln!(text, "  {}{undone}", done(step.name, step.count));
     }
@@ -103,10 +109,12 @@ fn done(step: &str, times: u64) -> String {
     counted(times, one, many)
 }
 
-fn verdict(healed: &Healed) -> String {
-    if healed.after.is_none() {
-        return if healed.steps.is_empty() { "nothing to heal" } else { "healed: closed, manifold, oriented" }
-            .to_owned();
+fn verdict(is_healed: bool, is_unchanged: bool) -> &'static str {
+    match (is_healed, is_unchanged) {
+        (true, true) => "nothing to heal",
+        (true, false) => "healed: closed, manifold, oriented",
+        (false, _) => {
+            "what is left needs more: zmend repair --keep-good makes a solid of it, and keeps the components that are good"
+        }
     }
-    "what is left needs more: zmend repair makes a solid of it, with a surface that is made anew".to_owned()
 }

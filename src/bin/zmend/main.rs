@@ -15,6 +15,7 @@ mod heal;
 mod info;
 mod interrupt;
 mod json;
+mod keep_good;
 mod measure;
 mod memory;
 mod octmesh;

@@ -6,7 +6,7 @@ use crate::goal::GoalFormat;
 use crate::measure::{Measured, Side};
 use crate::solid::{self, Job, Work};
 use crate::summary::Summary;
-use crate::{digits, goal, interrupt, memory};
+use crate::{digits, goal, interrupt, keep_good, memory};
 use glam::DVec3;
 use std::iter;
 use std::path::Path;
@@ -21,6 +21,9 @@ use zmend::{Error, Faces, Offset, Options, Result, repair_into, topology};
 const SMALL: u64 = 1_000_000;
 
 pub(crate) fn run(repair: &RepairArgs) -> Result<ExitCode> {
+    if repair.keep_good {
+        return keep_good::run(&repair.input, repair.goal(), &repair.work);
+    }
     make(&repair.input, repair.goal(), &repair.work, None)
 }
 

@@ -9,6 +9,12 @@ fn finite(at: DVec3) -> Result<()> {
     if at.is_finite() { Ok(()) } else { refuse(format!("{at} is no place")) }
 }
 
+/// The next handle where so many have been given out: they are never used again.
+pub(super) fn handle(used: usize) -> Result<u32> {
+    let next = u32::try_from(used).ok().filter(|&next| next < u32::MAX);
+    next.map_or_else(|| refuse("all handles have been used: make a mesh of it, and edit that".to_owned()), Ok)
+}
+
 /// A refusal.
 fn refuse<T>(problem: String) -> Result<T> {
     Err(Error::setting("edit", problem, "the mesh is as it was"))
@@ -18,9 +24,9 @@ impl Edit {
     /// Adds a point.
     ///
     /// # Errors
-    /// When a coordinate is not finite.
+    /// When a coordinate is not finite, or all 2^32 handles have been used.
     pub fn add_point(&mut self, at: DVec3) -> Result<PointId> {
-        let point = PointId(self.points.len() as u32);
+        let point = PointId(handle(self.points.len())?);
         finite(at)?;
         self.group(|edit| {
             edit.set_point(point, Some(at));
@@ -56,6 +62,22 @@ impl Edit {
         })
     }
 
+    /// Adds all points and faces of a mesh, as one edit. Returns the handles of its points.
+    ///
+    /// # Errors
+    /// When a point is not finite, or a face cannot be [added](Self::add_face); nothing is added then.
+    pub fn add_mesh(&mut self, mesh: &super::Mesh) -> Result<Vec<PointId>> {
+        self.group(|edit| {
+            let points = mesh.points.iter().map(|&p| edit.add_point(p)).collect::<Result<Vec<_>>>()?;
+            // What is not there is told as such.
+            let of = |v: &u32| points.get(*v as usize).copied().unwrap_or(PointId(u32::MAX));
+            for face in mesh.faces.iter() {
+                edit.add_face(&face.iter().map(of).collect::<Vec<_>>())?;
+            }
+            Ok(points)
+        })
+    }
+
     /// Adds a face.
     ///
     /// # Errors
@@ -63,7 +85,7 @@ impl Edit {
     /// either way round.
     pub fn add_face(&mut self, corners: &[PointId]) -> Result<FaceId> {
         self.check_face(corners, &[])?;
-        let face = FaceId(self.faces.len() as u32);
+        let face = FaceId(handle(self.faces.len())?);
         self.group(|edit| {
             edit.set_face(face, Some(corners.into()));
             Ok(face)

@@ -141,6 +141,45 @@ fn without_a_log_what_is_deleted_is_gone() {
     assert!(failed.is_err() && edit.to_mesh() == before);
 }
 
+/// Bug C4.8: reading a mesh into one that is edited went past the log, which had no bounds.
+#[test]
+fn a_mesh_that_is_added_can_be_undone() {
+    let mut edit = edit("cube");
+    let (before, start) = (edit.to_mesh(), edit.save_point());
+    let ball = sample::build("sphere", 1).unwrap();
+    let points = edit.add_mesh(&ball).unwrap();
+    assert_eq!((points.len(), edit.points().count()), (ball.points.len(), ball.points.len() + before.points.len()));
+    let both = edit.to_mesh();
+    assert!(edit.is_modified() && edit.undo() && edit.save_point() == start && edit.to_mesh() == before);
+    assert!(edit.redo() && edit.to_mesh() == both && edit.validate().is_ok());
+    // A mesh that cannot be added leaves nothing behind.
+    let bad = Mesh { points: vec![DVec3::ZERO; 3], faces: [&[0, 1, 2][..], &[0, 1, 7]].into_iter().collect() };
+    assert!(edit.add_mesh(&bad).unwrap_err().to_string().contains("no point"));
+    assert!(edit.to_mesh() == both && edit.undo() && !edit.undo());
+    // A log with bounds.
+    edit.limit_log(3);
+    (0..9).for_each(|_| drop(edit.add_mesh(&ball).unwrap()));
+    assert_eq!((0..9).filter(|_| edit.undo()).count(), 3);
+}
+
+/// Bug C4.13: handles ran over when all had been used, and refusals gave no reason.
+#[test]
+fn handles_do_not_run_over_and_refusals_have_reasons() {
+    let mut edit = edit("cube");
+    let first = edit.add_point(DVec3::ZERO).unwrap();
+    assert!(edit.undo() && edit.add_point(DVec3::ONE).unwrap() > first && edit.point(first).is_none());
+    for refusal in [
+        operations::handle(u32::MAX as usize).unwrap_err(),
+        operations::handle(usize::MAX).unwrap_err(),
+        edit.delete_point(PointId(99)).unwrap_err(),
+        edit.delete_face(FaceId(99)).unwrap_err(),
+        edit.move_point(first, DVec3::NAN).unwrap_err(),
+        edit.flip_edge(first, PointId(0)).unwrap_err(),
+    ] {
+        assert!(refusal.to_string().len() > 20, "{refusal}");
+    }
+}
+
 /// Bug C4.9: going through the faces backwards while deleting them moved the wrong cursor.
 #[test]
 fn faces_can_be_deleted_on_the_way_in_both_directions() {

@@ -1,6 +1,8 @@
 //! What kind of surface a mesh is, and its rims.
 
 use super::{Orientation, Topology};
+use crate::sets::Sets;
+use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -83,8 +85,15 @@ pub struct Diagnosis {
     pub spikes: u64,
     /// Sides that run from a point to itself.
     pub self_edges: u64,
+    /// Faces with more than three corners that are [bent](Topology::bend) by more than [`Diagnosis::BENT`].
+    pub bent_faces: u64,
     /// The rims.
     pub loops: Vec<BoundaryLoop>,
+}
+
+impl Diagnosis {
+    /// What is taken as planar: far above what coordinates in single precision lose, far below what is seen.
+    pub const BENT: f64 = 1e-3;
 }
 
 /// Marks an end of a boundary edge that has no partner.
@@ -112,15 +121,8 @@ impl Topology<'_> {
     }
 
     fn has_bow_ties(&self) -> bool {
-        let points = 0..self.corners.points() as u32;
-        let init = super::Star::default;
-        points
-            .into_par_iter()
-            .map_init(init, |star, point| {
-                star.visit(&self.corners, point);
-                star.fans() > 1
-            })
-            .any(|is_tie| is_tie)
+        let points = (0..self.corners.points() as u32).into_par_iter();
+        points.map_init(super::Star::default, |star, point| self.fans_with(star, point) > 1).any(|is_tie| is_tie)
     }
 
     /// Kind, orientability, spikes and rims. O(n).
@@ -149,36 +151,46 @@ impl Topology<'_> {
             faces_to_turn: turned.iter().map(|n| n[0].min(n[1])).sum(),
             spikes: corners(|before, here, after| before == after && before != here),
             self_edges: corners(|_, here, after| here == after),
+            bent_faces: self.bent_faces(),
             loops: self.boundary_loops(),
         }
+    }
+
+    /// How far a face is from being planar: the greatest distance of a corner from the plane through the mean of all with the face's
+    /// normal, as part of the greatest distance of a corner from that mean. None if the face has no normal.
+    pub fn bend(&self, face: u32) -> Option<f64> {
+        let normal = self.normal(face)?;
+        let corners = || self.mesh().faces.get(face as usize).iter().map(|&v| self.mesh().points[v as usize]);
+        let mean = corners().sum::<DVec3>() / corners().len() as f64;
+        let greatest = |of: fn(DVec3, DVec3) -> f64| corners().map(|p| of(p - mean, normal)).fold(0.0, f64::max);
+        Some(greatest(|way, normal| way.dot(normal).abs()) / greatest(|way, _| way.length()))
+    }
+
+    fn bent_faces(&self) -> u64 {
+        if self.corners.are_triangles() {
+            return 0;
+        }
+        let faces = (0..self.states.len() as u32).into_par_iter().filter(|&face| self.sides(face).len() > 3);
+        faces.filter(|&face| self.bend(face).is_some_and(|bend| bend > Diagnosis::BENT)).count() as u64
     }
 
     /// The corners at a point, each with the lowest corner of its fan.
     pub(in crate::mesh) fn corners_by_fan(&self, point: u32) -> Vec<(u32, u32)> {
         let corners = self.corners_at(point);
-        let mut fans: Vec<(u32, u32)> = Vec::with_capacity(corners.len());
-        let mut waiting = Vec::new();
-        for &first in corners {
-            if fans.iter().any(|&(corner, _)| corner == first) {
-                continue;
-            }
-            waiting.push(first);
-            fans.push((first, first));
-            while let Some(corner) = waiting.pop() {
-                for side in [corner, self.prev(corner)] {
-                    let [a, b] = self.ends(side);
-                    for user in self.users(side).filter(|_| a != b) {
-                        let beyond = if self.ends(user)[0] == point { user } else { self.next(user) };
-                        if !fans.iter().any(|&(known, _)| known == beyond) {
-                            fans.push((beyond, first));
-                            waiting.push(beyond);
-                        }
-                    }
+        let number = |corner: u32| corners.binary_search(&corner).expect("a corner at the point") as u32;
+        let fans = Sets::new(corners.len());
+        for (&corner, i) in corners.iter().zip(0..) {
+            for side in [corner, self.prev(corner)] {
+                let [a, b] = self.ends(side);
+                // To the next one round the edge: so all along it hang together.
+                let user = self.rings[side as usize];
+                if a != b && user != side {
+                    let beyond = if self.ends(user)[0] == point { user } else { self.next(user) };
+                    fans.union(i, number(beyond));
                 }
             }
         }
-        fans.sort_unstable();
-        fans
+        corners.iter().zip(0..).map(|(&corner, i)| (corner, corners[fans.root(i) as usize])).collect()
     }
 
     /// Sides along boundary edges, ascending.

@@ -43,6 +43,18 @@ mod tests {
     use crate::mesh::Mesh;
     use glam::DVec3;
 
+    /// Bug C4.10: looking for a face scribbled on the elements, so two threads could not do it at once.
+    #[test]
+    fn many_threads_look_for_faces_at_once() {
+        let gear = crate::mesh::sample::build("gear", 1).unwrap();
+        let topology = Topology::new(&gear);
+        let find = |i: usize| topology.find_face(gear.faces.get(i));
+        let alone: Vec<Option<u32>> = (0..gear.faces.len()).map(find).collect();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
+        let together: Vec<Option<u32>> = pool.install(|| (0..gear.faces.len()).into_par_iter().map(find).collect());
+        assert!(alone == together && alone.iter().all(Option::is_some));
+    }
+
     #[test]
     fn faces_are_found_whatever_point_comes_first() {
         let faces: [&[u32]; 4] = [&[0, 1, 2, 3], &[3, 2, 4], &[1, 0, 3, 2], &[0, 2, 1, 3]];

@@ -21,12 +21,14 @@
 //!
 //! # Cost
 //!
-//! 27 bytes a triangle: 12 for rings, 14 for corners at points, 1 of state; 12 more where faces differ in their number of corners.
-//! While it is made, no more than that. See `benches/mesh.rs`.
+//! 27 bytes a triangle: 12 for rings, 14 for corners at points, 1 of state; 12 more where faces differ in their number of corners, and 12 for
+//! a side along an edge with more than eight users. While it is made, 9 more. Edges and points with many faces are no worse than others:
+//! nothing is asked of every pair. See `benches/mesh.rs`.
 
 mod analysis;
 mod cycle;
 mod orient;
+mod rings;
 mod walk;
 
 pub use analysis::{BoundaryLoop, Diagnosis, MeshKind};
@@ -35,10 +37,8 @@ pub use walk::{Geodesics, Search};
 
 use super::Mesh;
 use super::corners::Corners;
-use super::star::{Star, repeated};
-use super::tally::CHUNK;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
+use super::star::Star;
+use rings::{Crowd, FEW, Rings};
 
 /// An edge as one number: the lower of its points in the upper 32 bits, the higher one in the lower.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -107,36 +107,15 @@ pub struct Topology<'a> {
     /// The next side along the same edge.
     rings: Vec<u32>,
     states: Vec<u8>,
+    crowds: Vec<Crowd>,
 }
 
 impl<'a> Topology<'a> {
     /// Finds all neighbourhoods, on all threads. O(n).
     pub fn new(mesh: &'a Mesh) -> Self {
         let corners = Corners::new(mesh);
-        let sides = mesh.faces.corners().len() as u32;
-        let rings: Vec<AtomicU32> = (0..sides).into_par_iter().map(AtomicU32::new).collect();
-        let states: Vec<AtomicU8> = (0..mesh.faces.len())
-            .into_par_iter()
-            .map(|i| {
-                let face = mesh.faces.get(i);
-                let bit = |is: bool, state: FaceState| if is { state.0 } else { 0 };
-                let is_sound = mesh.is_sound(face);
-                let twice = is_sound && repeated(face).is_some();
-                AtomicU8::new(bit(!is_sound, FaceState::UNSOUND) | bit(twice, FaceState::DEGENERATE))
-            })
-            .collect();
-        // Every side belongs to the lower of its points, so each entry of `rings` is written once, whoever does it.
-        (0..corners.points().div_ceil(CHUNK)).into_par_iter().for_each_init(Vec::new, |sides, chunk| {
-            for v in chunk * CHUNK..corners.points().min((chunk + 1) * CHUNK) {
-                upper_sides(&corners, v as u32, sides);
-                for edge in sides.chunk_by(|a, b| a >> 32 == b >> 32) {
-                    link(&corners, v as u32, edge, &rings, &states);
-                }
-            }
-        });
-        let rings = rings.into_iter().map(AtomicU32::into_inner).collect();
-        let states = states.into_iter().map(AtomicU8::into_inner).collect();
-        Topology { corners, rings, states }
+        let Rings { next: rings, states, crowds } = Rings::new(&corners);
+        Topology { corners, rings, states, crowds }
     }
 
     /// The mesh.
@@ -146,7 +125,8 @@ impl<'a> Topology<'a> {
 
     /// Bytes held, besides the mesh.
     pub fn bytes(&self) -> u64 {
-        self.corners.bytes() + 4 * self.rings.len() as u64 + self.states.len() as u64
+        let crowds = size_of::<Crowd>() * self.crowds.len();
+        self.corners.bytes() + 4 * self.rings.len() as u64 + self.states.len() as u64 + crowds as u64
     }
 
     /// What is known of a face.
@@ -224,7 +204,26 @@ impl<'a> Topology<'a> {
     /// How often faces run along a side's edge; 0 if both ends are one point.
     pub fn count(&self, side: u32) -> u32 {
         let [a, b] = self.ends(side);
-        if a == b { 0 } else { self.users(side).count() as u32 }
+        if a == b {
+            return 0;
+        }
+        match self.crowd(side) {
+            Some(crowd) => crowd.users,
+            None => self.users(side).count() as u32,
+        }
+    }
+
+    /// A side's edge, if it has more than a few users. O(1) for others.
+    fn crowd(&self, side: u32) -> Option<&Crowd> {
+        if self.crowds.is_empty() || self.users(side).take(FEW + 1).count() <= FEW {
+            return None;
+        }
+        Some(&self.crowds[self.crowds.binary_search_by_key(&side, |crowd| crowd.side).ok()?])
+    }
+
+    /// Whether a side is the lowest along its edge.
+    fn is_lowest(&self, side: u32) -> bool {
+        self.crowd(side).map_or_else(|| self.users(side).all(|other| side <= other), |crowd| crowd.lowest == side)
     }
 
     /// The lowest side along the edge between two points, in either order. O(corners at a point).
@@ -251,55 +250,38 @@ impl<'a> Topology<'a> {
     /// The faces that share an edge with a face, in order of its sides, through non-manifold edges as well. A face comes once for each
     /// edge shared; the face itself does not come.
     pub fn neighbours(&self, face: u32) -> impl Iterator<Item = u32> + '_ {
-        let others = self.sides(face).flat_map(|side| self.users(side).skip(1));
-        others.map(|side| self.face(side)).filter(move |&other| other != face)
+        self.sides(face).flat_map(|side| self.beyond(side)).filter(move |&other| other != face)
+    }
+
+    /// The sides of a face along which another one lies, through non-manifold edges as well.
+    pub fn shared_sides(&self, face: u32, other: u32) -> impl Iterator<Item = u32> + '_ {
+        self.sides(face).filter(move |&side| other != face && self.beyond(side).any(|beyond| beyond == other))
+    }
+
+    /// The faces of the other users of a side's edge.
+    fn beyond(&self, side: u32) -> impl Iterator<Item = u32> + '_ {
+        self.users(side).skip(1).map(|side| self.face(side))
     }
 
     /// All edges, each by its lowest side, in ascending order of these.
     pub fn edges(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.states.len() as u32).flat_map(|face| self.sides(face)).filter(|&side| {
             let [a, b] = self.ends(side);
-            a != b && self.users(side).all(|other| side <= other)
+            a != b && self.is_lowest(side)
         })
     }
 
     /// Number of fans at a point: sets of corners that hang together by edges. 0 if no sound face uses the point, more than one at a
     /// bow-tie.
     pub fn fans(&self, point: u32) -> u32 {
-        let mut star = Star::default();
+        self.fans_with(&mut Star::default(), point)
+    }
+
+    /// The same, with a star that is moved from point to point.
+    pub(in crate::mesh) fn fans_with(&self, star: &mut Star, point: u32) -> u32 {
         star.visit(&self.corners, point);
         star.fans()
     }
-}
-
-/// The sides between a point and higher ones: these in the upper half, the side in the lower one; sorted.
-fn upper_sides(corners: &Corners<'_>, v: u32, sides: &mut Vec<u64>) {
-    sides.clear();
-    for &corner in corners.at(v) {
-        let before = corners.prev(corner);
-        let ends = [(corners.point(corners.next(corner)), corner), (corners.point(before), before)];
-        sides.extend(
-            ends.iter().filter(|(other, _)| *other > v).map(|&(o, side)| (u64::from(o) << 32) | u64::from(side)),
-        );
-    }
-    sides.sort_unstable();
-}
-
-/// Makes a ring of the sides along one edge, and tells their faces what it is.
-fn link(corners: &Corners<'_>, v: u32, edge: &[u64], rings: &[AtomicU32], states: &[AtomicU8]) {
-    let side = |k: usize| edge[k] as u32;
-    let n = edge.len();
-    if n > 1 {
-        (0..n).for_each(|k| rings[side(k) as usize].store(side(if k + 1 == n { 0 } else { k + 1 }), Relaxed));
-    }
-    let leaves = |k: usize| corners.point(side(k)) == v;
-    let state = match n {
-        1 => FaceState::BOUNDARY,
-        2 if leaves(0) != leaves(1) => return,
-        2 => FaceState::INCONSISTENT,
-        _ => FaceState::NON_MANIFOLD,
-    };
-    (0..n).for_each(|k| _ = states[corners.face(side(k)) as usize].fetch_or(state.0, Relaxed));
 }
 
 #[cfg(test)]

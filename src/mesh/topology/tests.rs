@@ -67,6 +67,12 @@ fn check(mesh: &Mesh) {
         let neighbours: BTreeSet<u32> = topology.neighbours(i).collect();
         let expected: BTreeSet<u32> = of_face.iter().copied().flatten().map(|u| u.0).filter(|&f| f != i).collect();
         assert_eq!(neighbours, expected);
+        assert!(neighbours.iter().all(|&other| {
+            let shared: Vec<u32> = topology.shared_sides(i, other).collect();
+            !shared.is_empty()
+                && shared.iter().all(|&side| topology.users(side).any(|user| topology.face(user) == other))
+        }));
+        assert_eq!(topology.shared_sides(i, i).count(), 0);
     }
     // Every boundary edge is in one chain, once.
     let mut rims: Vec<EdgeKey> =
@@ -206,6 +212,52 @@ fn case_isolated_vertices() {
     let topology = Topology::new(&lone);
     assert_eq!((topology.connected(5).count(), topology.faces_at(5).count(), topology.fans(5)), (0, 0, 0));
     assert_eq!(topology.kind().to_string(), "closed, manifold, oriented");
+}
+
+#[test]
+fn bent_faces_are_told_from_planar_ones() {
+    let square = |z: f64| vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, z), DVec3::Y, DVec3::splat(9.0)];
+    let faces: [&[u32]; 4] = [&[0, 1, 2, 3], &[0, 1, 4], &[3, 2, 1, 0], &[0, 0, 0, 0]];
+    for (z, bent) in [(0.0, 0), (1e-6, 0), (0.1, 2)] {
+        let mesh = Mesh { points: square(z), faces: faces.into_iter().collect() };
+        let topology = Topology::new(&mesh);
+        assert_eq!(topology.diagnose().bent_faces, bent);
+        // The corners lie a quarter of the height above and below the mean.
+        let expected = 0.25 * z / 0.5f64.sqrt();
+        assert!((topology.bend(0).unwrap() - expected).abs() <= 1e-2 * z && topology.bend(3).is_none());
+        assert!(topology.bend(1).unwrap() < 1e-12);
+    }
+}
+
+/// Bug C4.13: tables took several pieces of memory for each element.
+#[test]
+fn tables_take_few_bytes() {
+    for name in ["knot", "gear", "scan"] {
+        let mesh = sample::build(name, 1).unwrap();
+        let topology = Topology::new(&mesh);
+        assert!(topology.bytes() <= 40 * mesh.faces.len() as u64, "{name}");
+    }
+}
+
+/// Queries at points and edges with very many faces took time with the square of their number.
+#[test]
+fn fans_and_books_are_no_worse_than_others() {
+    let n = 100_000;
+    let mut mesh = Mesh { points: (0..n + 2).map(|i| DVec3::new(f64::from(i), 1.0, 0.0)).collect(), ..Mesh::default() };
+    // Every other triangle of a fan: as many rims as triangles meet in its tip.
+    (1..n).step_by(2).for_each(|i| mesh.faces.push(&[0, i, i + 1]));
+    let topology = Topology::new(&mesh);
+    assert_eq!((topology.fans(0), topology.boundary_loops().len()), (n / 2, n as usize / 2));
+    assert!(topology.kind().has_bow_ties);
+    // A book: all triangles along one edge.
+    mesh.faces = (2..n).map(|i| [0, 1, i]).collect::<Vec<_>>().iter().map(|f| &f[..]).collect();
+    let topology = Topology::new(&mesh);
+    assert_eq!(topology.edges().count(), 2 * (n as usize - 2) + 1);
+    assert_eq!((topology.count(0), topology.neighbour(3)), (n - 2, Neighbour::Many(n - 3)));
+    assert_eq!(topology.breadth_first(7).map(|step| step.1).max(), Some(1));
+    let found = topology.diagnose();
+    assert!(found.kind.has_non_manifold_edges && found.is_orientable);
+    assert_eq!(topology.features(&crate::mesh::FeatureOptions::default()).non_manifold, [0]);
 }
 
 /// Rims that touch in a point are rims of their own.

@@ -21,6 +21,8 @@ pub struct Search<'a> {
     topology: &'a Topology<'a>,
     waiting: VecDeque<(u32, u32)>,
     seen: HashSet<u32, RandomState>,
+    /// Edges with many users over which the walk has gone already, by their lowest sides; only breadth first.
+    crossed: HashSet<u32, RandomState>,
     is_deep: bool,
 }
 
@@ -35,7 +37,12 @@ impl Iterator for Search<'_> {
                 continue;
             }
             let start = self.waiting.len();
-            for other in self.topology.neighbours(face) {
+            let Search { topology, crossed, .. } = self;
+            let sides = topology.sides(face).filter(|&side| {
+                let crowd = if self.is_deep { None } else { topology.crowd(side) };
+                crowd.is_none_or(|crowd| crossed.insert(crowd.lowest))
+            });
+            for other in sides.flat_map(|side| topology.beyond(side)).filter(|&other| other != face) {
                 if if self.is_deep { !self.seen.contains(&other) } else { self.seen.insert(other) } {
                     self.waiting.push_back((other, depth + 1));
                 }
@@ -66,7 +73,7 @@ impl Topology<'_> {
     }
 
     /// All faces that can be reached from one, going on from the last one found as long as there is a way; the number of steps is that of
-    /// the way taken.
+    /// the way taken. An edge with n users takes n² steps.
     ///
     /// # Panics
     /// When there is no such face.
@@ -80,7 +87,8 @@ impl Topology<'_> {
         if !is_deep {
             seen.insert(seed);
         }
-        Search { topology: self, waiting: VecDeque::from([(seed, 0)]), seen, is_deep }
+        let crossed = HashSet::with_hasher(hasher());
+        Search { topology: self, waiting: VecDeque::from([(seed, 0)]), seen, crossed, is_deep }
     }
 
     /// The faces at most `rings` steps through common edges away from one, the nearest first; with the number of steps.

@@ -5,8 +5,18 @@ use clap::value_parser;
 use std::path::PathBuf;
 use zmend::mesh::HealOptions;
 
+/// What all that write a file and tell of it have in common.
+#[derive(Debug, clap::Args)]
+pub(crate) struct OutputArgs {
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Replace OUT if it exists.
+    #[arg(short, long)]
+    pub(crate) force: bool,
+}
+
 /// Repair what can be repaired locally; every good face stays as it is.
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -18,7 +28,7 @@ Examples:
 Points of rims are welded and stitched, degenerate and duplicate faces go, faces are turned to run one way round, solids \
 that share edges are cut apart, small holes are filled to match. No kind of defect is more frequent afterwards than before, \
 and a mesh without defects is written as `zmend convert` would. What is left is told; `zmend repair` makes a solid of \
-anything, but makes the surface anew.")]
+anything, but makes the surface anew; with --keep-good only that of components that are not whole after healing.")]
 pub(crate) struct HealArgs {
     /// Mesh to heal.
     #[arg(value_name = "IN")]
@@ -39,12 +49,8 @@ pub(crate) struct HealArgs {
     /// Do not look for self-intersections, old or new.
     #[arg(short, long)]
     pub(crate) quick: bool,
-    /// Print one JSON object instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Replace OUT if it exists.
-    #[arg(short, long)]
-    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
 }
 
 /// Write the lines along which a mesh folds, ends or branches.
@@ -70,12 +76,8 @@ pub(crate) struct FeaturesArgs {
     /// Leave out the edges where the surface ends or branches.
     #[arg(long)]
     pub(crate) folds_only: bool,
-    /// Print one JSON object instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Replace OUT if it exists.
-    #[arg(short, long)]
-    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
 }
 
 /// Write a mesh in another format; polygons stay polygons where the format has them.
@@ -86,7 +88,9 @@ Examples:
   zmend convert part.obj part.stl --ascii
 
 Coordinates are written with 32 bits if nothing is lost by that, else with 64 where the format has them. The triangles of STL \
-files are connected where their corners are identical to the last bit.")]
+files are connected where their corners are identical to the last bit; formats that have only triangles get polygons cut along diagonals \
+that fold least. Vertices come before faces in most formats, and STL files do not have them, so the mesh is in memory meanwhile: 24 bytes a vertex \
+and 16 a triangle, and while it is read, the file.")]
 pub(crate) struct ConvertArgs {
     /// Mesh to read.
     #[arg(value_name = "IN")]
@@ -97,7 +101,6 @@ pub(crate) struct ConvertArgs {
     /// Write numbers as text where the format has both (STL, PLY).
     #[arg(long)]
     pub(crate) ascii: bool,
-    /// Replace OUT if it exists.
-    #[arg(short, long)]
-    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
 }

@@ -153,6 +153,8 @@ Examples:
   zmend render broken.ply picture.png
   zmend render broken.ply both.png --compare fixed.ply      side by side at one scale
   zmend render broken.ply wrong.png --defects               what is wrong, in colour
+  zmend topology scan.ply clean.ply --cut all --patches cuts.ply
+  zmend render scan.ply cuts.png --compare clean.ply --patches cuts.ply    where handles are cut, in red, and tunnels filled, in blue
   zmend render part.stl top.png --elevation 90 --wireframe --size 1600x1200")]
 pub(crate) struct RenderArgs {
     /// Mesh to draw.
@@ -179,6 +181,10 @@ pub(crate) struct RenderArgs {
     /// through others yellow.
     #[arg(long)]
     pub(crate) defects: bool,
+    /// Draw the membranes of cuts (red) and fills (blue) that `zmend topology --patches` has written to a PLY file; they are seen through
+    /// the surface.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) patches: Option<PathBuf>,
     /// Replace OUT.png if it exists.
     #[arg(short, long)]
     pub(crate) force: bool,

@@ -30,6 +30,7 @@ Examples:
   zmend repair cad.stl shell.stl --inside hull --gap 0.5    the outer shell, gaps up to 0.5 units closed
   zmend repair leaf.obj leaf.stl --thicken 0.8        open sheets become walls 0.8 units thick
   zmend repair scan.ply body.ply --keep largest --drop-cavities    one solid and nothing within
+  zmend repair parts.obj fixed.obj --keep-good        heal, keep the components that are good then, make the others anew
   zmend repair scan.ply body.ply --cut 0.5 --fill 2    thin handles cut, small holes filled: see `zmend help topology`
 
 The grid has 2^depth cells a side. What is thinner than a cell may vanish or grow together: take a greater depth then. \
@@ -45,6 +46,12 @@ pub(crate) struct RepairArgs {
     /// The same as OUT.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+    /// Heal the mesh as `zmend heal` does, keep the components that are solids then, face for face, and make only the others anew.
+    ///
+    /// A component is made anew if it is open, not manifold or not oriented, if it meets itself or another one, if it lies in or around one
+    /// that is made anew, or if it is in the way of what is.
+    #[arg(long)]
+    pub(crate) keep_good: bool,
 
     #[command(flatten)]
     pub(crate) work: WorkArgs,
