@@ -92,8 +92,10 @@
 //! in files of volumes. `serde` lets octrees be serialised.
 #![forbid(unsafe_code)]
 
+pub mod cloud;
 pub mod contour;
 pub mod error;
+pub mod field;
 pub mod geom;
 pub mod grid;
 pub mod io;

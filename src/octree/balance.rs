@@ -26,8 +26,9 @@ struct Made(Vec<HashMap<Key, Cells, RandomState>>);
 
 impl<T> LinearOctree<T> {
     /// Splits leaves until neighbours differ by at most one level across what `balance` says; no more than necessary. `split` makes the
-    /// record of each child from its parent's, from coarse to fine, in an order that does not depend on threads or history. Returns
-    /// how many leaves were split. Holes stay holes. Costs some 0.2 us a leaf for balance over corners, less for less.
+    /// record of each child from its parent's, from coarse to fine, in an order that does not depend on threads or history. Returns how
+    /// many leaves were split. Holes stay holes. Costs some 0.2 us a leaf for balance over corners, less for less: what has to be split is
+    /// found on all threads, the splitting itself is done on one, since it changes the table.
     ///
     /// ```
     /// use zmend::grid::Key;

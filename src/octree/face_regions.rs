@@ -9,8 +9,8 @@ impl<T> LinearOctree<T> {
     /// face beyond which there is nothing, on the boundary of the root or of a tree with holes: the outside. The others are cavities, 1,
     /// 2, ... by their first leaves in Z-order.
     ///
-    /// A wall of leaves that meet at edges only holds: nothing leaks between two cells diagonally. O(n) probes; 12 bytes a leaf beside
-    /// the result while it runs.
+    /// A wall of leaves that meet at edges only holds: nothing leaks between two cells diagonally. O(n) probes, on one thread; 12 bytes a leaf
+    /// beside the result while it runs.
     ///
     /// ```
     /// use zmend::grid::Key;

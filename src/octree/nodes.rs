@@ -120,6 +120,11 @@ impl<T, V: Value> NodalOctree<T, V> {
         self.nodes.get(&point).map_or(0, |node| u32::from(node.uses))
     }
 
+    /// All nodes and their values, in no order that matters.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = (Key, V)> + '_ {
+        self.nodes.iter().map(|(&point, node)| (point, node.value))
+    }
+
     /// All nodes and their values in Z-order. Collects and sorts.
     pub fn nodes_z(&self) -> Vec<(Key, V)> {
         let mut nodes: Vec<(Key, V)> = self.nodes.iter().map(|(&point, node)| (point, node.value)).collect();

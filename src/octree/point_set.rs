@@ -1,6 +1,6 @@
 //! Sets of lattice points or cells, a plane a brick.
 
-use super::LinearOctree;
+use super::{CellState, LinearOctree};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Face, Key};
 
@@ -23,6 +23,16 @@ impl PointSet {
     /// How many bricks have points of the set.
     pub(crate) fn bricks(&self) -> usize {
         self.planes.len()
+    }
+
+    /// The bricks that have, in order.
+    pub(crate) fn keys(&self) -> Vec<Key> {
+        self.planes.keys_z()
+    }
+
+    /// Whether a cell of the brick's level or above has a point of the set in it. Two probes at most.
+    pub(crate) fn any_in(&self, cell: Key) -> bool {
+        !matches!(self.planes.state(cell), CellState::Absent)
     }
 
     /// Bytes held.

@@ -152,6 +152,11 @@ impl<'a, E: ClosedEdges> Regions<'a, E> {
         self.parts(brick).filter(|part| wanted(part.0)).fold(Plane::EMPTY, |a, (_, &part)| a | part)
     }
 
+    /// The region of a lattice point, in cells. Cost: that of finding its brick, and a look at its parts.
+    pub fn of_point(&self, at: [u32; 3]) -> u32 {
+        self.region[self.node(at) as usize]
+    }
+
     /// The region that all points of an absent brick lie in. Cost: a binary search.
     pub fn of_absent(&self, brick: Key) -> u32 {
         let at = lattice_point(self.edges.depth(), brick).map(|c| c >> 3);

@@ -44,7 +44,9 @@ impl<T> LinearOctree<T> {
         Counted { leaves: self.leaves_in(Key::ROOT), left: self.len() }
     }
 
-    /// All leaves in Z-order, with records to change. Collects a key and a reference for each, 16 bytes, and sorts them.
+    /// All leaves in Z-order, with records to change. Collects a key and a reference for each, 16 bytes, and sorts them, on one thread:
+    /// safe code cannot hand out references into a hash table along the curve otherwise. [`par_iter_z_mut`](Self::par_iter_z_mut) does so on
+    /// all threads, and [`iter_mut`](Self::iter_mut) needs no list.
     pub fn iter_z_mut(&mut self) -> impl ExactSizeIterator<Item = (Key, &mut T)> + DoubleEndedIterator {
         let mut leaves: Vec<(Key, &mut T)> = self.iter_mut().collect();
         leaves.sort_unstable_by_key(|&(leaf, _)| leaf);

@@ -1,5 +1,7 @@
 //! The pipeline: any bag of polygons in, a closed, manifold, consistently oriented surface out.
 
+mod clouds;
+mod distances;
 mod hull;
 mod inside;
 mod keep_good;
@@ -12,6 +14,7 @@ mod solid;
 mod trace;
 
 pub use crate::sign::{Keep, Kept, Offset, Thicken};
+pub use distances::CellOptions;
 pub use inside::{InsideChoice, Reason};
 pub use keep_good::{KeptParts, Mended, repair_keeping_good};
 pub use options::{Faces, Inside, Options, Surface};

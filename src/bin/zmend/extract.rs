@@ -43,7 +43,8 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<ExitCode> {
             }
             let options = Options { surface, ..Options::default() };
             let given = args.cell.map(|_| "cell");
-            let work = Work { options, given, cell: args.cell, max_memory: args.max_memory, write, tell: &args.tell };
+            let (cell, max_memory, tell) = (args.cell, args.max_memory, &args.tell);
+            let work = Work { options, given, cell, max_memory, cloud: None, write, tell };
             let volume = Some(&args.volume);
             solid::run(&Job {
                 input,

@@ -2,6 +2,7 @@
 
 mod args;
 mod bars;
+mod cloud;
 mod compare;
 mod convert;
 mod details;
@@ -17,6 +18,7 @@ mod json;
 mod keep_good;
 mod measure;
 mod memory;
+mod octmesh;
 mod print;
 mod render;
 mod repair;
@@ -56,6 +58,9 @@ fn run(args: &Args) -> Result<ExitCode> {
         Command::Topology(args) => topology::run(args),
         Command::Extract(args) => extract::run(args),
         Command::Remesh(args) => repair::remesh(args),
+        Command::Surface(args) => cloud::surface(args),
+        Command::Points(args) => cloud::points(args),
+        Command::Octmesh(args) => octmesh::run(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Heal(args) => heal::run(args),

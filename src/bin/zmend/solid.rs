@@ -1,6 +1,6 @@
 //! The pipeline step by step, where a solid is what comes in, or what goes out, or what is worked on: octree files and topology.
 
-use crate::args::{SurfaceArg, TellArgs, VolumeArgs, WorkArgs, WriteArgs};
+use crate::args::{CloudArgs, SurfaceArg, TellArgs, VolumeArgs, WorkArgs, WriteArgs};
 use crate::bars::Bars;
 use crate::goal::GoalFormat;
 use crate::handles;
@@ -8,16 +8,17 @@ use crate::measure::{Measured, Side};
 use crate::repair::{self, Bounded, after};
 use crate::summary::surface_name;
 use crate::volume::{self, Loaded, Told};
-use crate::{digits, interrupt, json, memory, print, units};
+use crate::{cloud, digits, interrupt, json, memory, print, units};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::{Duration, Instant};
+use zmend::cloud::CloudReport;
 use zmend::io::{self, OctreeFormat, OctreeInfo, WriteOptions};
 use zmend::mesh::MeshSizes;
 use zmend::progress::{Progress, Stage};
 use zmend::repair::{Trace, Warning, membranes};
 use zmend::topology::{self, Kind, TopologyReport};
-use zmend::{Error, Faces, Options, RepairReport, Result, Solid, Surface, solidify};
+use zmend::{Error, Faces, Keep, Options, RepairReport, Result, Solid, Surface, sign, solidify};
 
 /// What is to be done.
 pub(crate) struct Job<'a> {
@@ -45,6 +46,8 @@ pub(crate) struct Work<'a> {
     /// Side of a cell.
     pub(crate) cell: Option<f64>,
     pub(crate) max_memory: Option<u64>,
+    /// What is said of points, where the input is points.
+    pub(crate) cloud: Option<&'a CloudArgs>,
     pub(crate) write: &'a WriteArgs,
     pub(crate) tell: &'a TellArgs,
 }
@@ -57,6 +60,7 @@ impl<'a> Work<'a> {
             given: args.grid.given,
             cell: args.grid.cell,
             max_memory: args.grid.max_memory,
+            cloud: None,
             write: &args.write,
             tell: &args.tell,
         }
@@ -86,6 +90,8 @@ pub(crate) enum Source {
     Octree(OctreeInfo),
     Mesh(Box<RepairReport>),
     Volume(Box<Told>),
+    /// And the side of its cells.
+    Cloud(CloudReport, f64),
 }
 
 /// The time that each piece of work took.
@@ -98,6 +104,9 @@ pub(crate) fn open(
     volume: Option<&VolumeArgs>,
     bars: &Bars,
 ) -> Result<(Solid, Source, Times)> {
+    if let Some(args) = work.cloud {
+        return open_cloud(path, args, bars);
+    }
     let from = OctreeFormat::of_file(path)?;
     let has_grid = || format!("{} has a grid of its own", path.display());
     let is_volume = volume::is_volume(path, volume)?;
@@ -133,11 +142,29 @@ pub(crate) fn open(
     Ok((solid, Source::Mesh(Box::new(report)), times))
 }
 
+/// Makes a solid of points.
+fn open_cloud(path: &Path, args: &CloudArgs, bars: &Bars) -> Result<(Solid, Source, Times)> {
+    let start = Instant::now();
+    let mut points = io::read_cloud(path)?;
+    if args.no_normals {
+        points.normals.clear();
+    }
+    let read = start.elapsed();
+    let (mut solid, report) = Solid::from_cloud(&points, &args.cloud_options(), bars)?;
+    if args.keep != Keep::All || args.drop_cavities {
+        let (octree, _) = sign::keep(solid.octree.into_signed(), args.keep, args.drop_cavities, bars)?;
+        solid = Solid::new(octree, solid.frame);
+    }
+    let times = vec![("read", read), (Stage::Sign.name(), start.elapsed().saturating_sub(read))];
+    let source = Source::Cloud(report, solid.frame.cell_size());
+    Ok((solid, source, times))
+}
+
 pub(crate) fn run(job: &Job<'_>) -> Result<()> {
     let mut work = job.work.clone();
     work.options.surface = surface_of(work.options.surface, job.to);
     let mut bars = Bars::new(!work.tell.quiet && !work.tell.json);
-    if volume::is_volume(job.input, job.volume)? {
+    if work.cloud.is_some() || volume::is_volume(job.input, job.volume)? {
         bars = bars.within(memory::limit(work.max_memory)?);
     }
     let start = Instant::now();
@@ -232,6 +259,7 @@ impl Source {
             }
             Source::Octree(info) => json::octree_file(info),
             Source::Volume(told) => told.json(),
+            Source::Cloud(report, _) => cloud::as_json(report, path),
         }
     }
 
@@ -240,6 +268,7 @@ impl Source {
         match self {
             Source::Mesh(report) => report.warnings.iter().map(ToString::to_string).collect(),
             Source::Volume(told) => told.warnings(),
+            Source::Cloud(report, cell) => cloud::warnings(report, *cell),
             Source::Octree(info) => {
                 let ignored = units::counted(info.trailing_bytes, "byte", "bytes");
                 let missing = units::counted(info.missing_samples, "crossed edge", "crossed edges");
@@ -304,6 +333,9 @@ impl Outcome<'_> {
         if let Source::Volume(told) = &self.source {
             told.lines(&mut table);
             level = format!(", what is {}", told.level_words());
+        }
+        if let Source::Cloud(report, _) = &self.source {
+            cloud::lines(report, &mut table);
         }
         table.line("surface cells", &[Some(units::count(self.surface_cells()))]);
         table.line("crossed edges", &[Some(units::count(solid.signed().crossings().len() as u64))]);

@@ -100,6 +100,16 @@ pub(super) trait Body {
 
     /// [`points`](Self::points) for any layout.
     fn any_points(&mut self, element: &Element, mut visit: impl FnMut(DVec3) -> Result<()>) -> Result<()> {
+        self.vertices(element, None, |point, _| visit(point))
+    }
+
+    /// Calls `visit` with the position in each record, and the vector of three further properties if they are given.
+    fn vertices(
+        &mut self,
+        element: &Element,
+        normals: Option<[usize; 3]>,
+        mut visit: impl FnMut(DVec3, Option<DVec3>) -> Result<()>,
+    ) -> Result<()> {
         if element.count == 0 {
             return Ok(());
         }
@@ -107,14 +117,19 @@ pub(super) trait Body {
             self.error(format!("vertices have no property `{name}`"), "export the file with three coordinates")
         })?;
         for _ in 0..element.count {
-            let mut point = DVec3::ZERO;
+            let (mut point, mut normal) = (DVec3::ZERO, normals.map(|_| DVec3::ZERO));
             for (i, property) in element.properties.iter().enumerate() {
-                match (coordinates.iter().position(|&c| c == i), property.kind) {
-                    (Some(axis), Kind::One(scalar)) => point[axis] = self.value(scalar, element)?,
-                    (_, kind) => self.skip_property(kind, element)?,
+                let axis_in = |list: [usize; 3]| list.iter().position(|&c| c == i);
+                match (axis_in(coordinates), normals.and_then(axis_in), property.kind) {
+                    (Some(axis), _, Kind::One(scalar)) => point[axis] = self.value(scalar, element)?,
+                    (_, Some(axis), Kind::One(scalar)) => {
+                        let value = self.value(scalar, element)?;
+                        normal.iter_mut().for_each(|normal| normal[axis] = value);
+                    }
+                    (.., kind) => self.skip_property(kind, element)?,
                 }
             }
-            visit(point)?;
+            visit(point, normal)?;
             self.end_record();
         }
         Ok(())

@@ -90,9 +90,18 @@ impl Scalar {
 impl Element {
     /// The positions of the properties `x`, `y`, `z`, or the first one that is missing.
     pub(super) fn coordinates(&self) -> Result<[usize; 3], &'static str> {
-        let find =
-            |name| self.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_))).ok_or(name);
+        let find = |name| self.one(name).ok_or(name);
         Ok([find("x")?, find("y")?, find("z")?])
+    }
+
+    /// The positions of the properties `nx`, `ny`, `nz`, if all are there.
+    pub(super) fn normals(&self) -> Option<[usize; 3]> {
+        Some([self.one("nx")?, self.one("ny")?, self.one("nz")?])
+    }
+
+    /// The position of a property with one value.
+    fn one(&self, name: &str) -> Option<usize> {
+        self.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::One(_)))
     }
 
     /// The position of the list of vertex indices.

@@ -18,6 +18,7 @@ use super::build::Builder;
 use super::bytes::Bytes;
 use super::text::Text;
 use super::{Encoding, Parsed};
+use crate::cloud::Cloud;
 use crate::error::Result;
 
 /// Reads a whole PLY file in memory.
@@ -35,6 +36,43 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Parsed> {
         Encoding::BigEndian => read_elements(&header, &mut Binary::<BigEndian, _>::new(body()), &mut builder)?,
     }
     Ok(Parsed { mesh: builder.finish(), encoding: header.encoding, trailing_bytes: 0 })
+}
+
+/// Reads the vertices of a PLY file in memory, with their properties `nx`, `ny`, `nz` as normals if all three are there.
+pub(super) fn parse_cloud(name: &str, bytes: &[u8]) -> Result<Cloud> {
+    let header = Header::parse(name, bytes)?;
+    let body = || Bytes::new(name, &bytes[header.body..], header.body as u64, bytes.len() as u64);
+    match header.encoding {
+        Encoding::Text => {
+            let mut text = Text::new(name, bytes);
+            text.advance(header.body);
+            read_vertices(&header, &mut text)
+        }
+        Encoding::LittleEndian => read_vertices(&header, &mut Binary::<LittleEndian, _>::new(body())),
+        Encoding::BigEndian => read_vertices(&header, &mut Binary::<BigEndian, _>::new(body())),
+    }
+}
+
+/// Reads the elements up to the vertices.
+fn read_vertices(header: &Header, body: &mut impl Body) -> Result<Cloud> {
+    let mut cloud = Cloud::default();
+    for element in &header.elements {
+        body.check_size(element)?;
+        if element.name != "vertex" {
+            body.skip(element)?;
+            continue;
+        }
+        cloud.points.reserve(element.count as usize);
+        let normals = element.normals();
+        cloud.normals.reserve(if normals.is_some() { element.count as usize } else { 0 });
+        body.vertices(element, normals, |point, normal| {
+            cloud.points.push(point);
+            cloud.normals.extend(normal);
+            Ok(())
+        })?;
+        break;
+    }
+    Ok(cloud)
 }
 
 /// Reads all elements in their order in the file.

@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod compare;
+mod fields;
 mod local;
 mod repair;
 mod topology;
@@ -8,6 +9,7 @@ mod values;
 mod volume;
 
 pub(crate) use compare::CompareArgs;
+pub(crate) use fields::{CloudArgs, CloudMethodArg, OctmeshArgs, PointsArgs};
 pub(crate) use local::{ConvertArgs, FeaturesArgs, HealArgs};
 pub(crate) use repair::{FacesArg, RemeshArgs, RepairArgs, ReportArg, SurfaceArg, TellArgs, WorkArgs, WriteArgs};
 pub(crate) use topology::{Form, TopologyArgs};
@@ -38,6 +40,7 @@ Examples:
   zmend repair broken.ply fixed.ply           repair it
   zmend topology fixed.ply clean.ply --cut 2  cut its thin handles
   zmend extract scan.mhd scan.ply --iso 300   the surface of a volume
+  zmend surface points.xyz part.stl           the surface that points were taken of
   zmend compare broken.ply fixed.ply          how far it has moved
   zmend render broken.ply picture.png --compare fixed.ply
 
@@ -59,6 +62,7 @@ pub(crate) fn parse() -> Args {
         Command::Repair(args) => Some(&mut args.work),
         Command::Topology(args) => Some(&mut args.work),
         Command::Remesh(args) => Some(&mut args.work),
+        Command::Octmesh(args) => Some(&mut args.work),
         _ => None,
     };
     if let (Some(work), Some((_, matches))) = (work, matches.subcommand()) {
@@ -82,6 +86,9 @@ pub(crate) enum Command {
     Topology(TopologyArgs),
     Extract(ExtractArgs),
     Remesh(RemeshArgs),
+    Surface(CloudArgs),
+    Points(PointsArgs),
+    Octmesh(OctmeshArgs),
     Info(InfoArgs),
     Compare(CompareArgs),
     Heal(HealArgs),
