@@ -59,6 +59,8 @@
 //! | [`topology`] | thin handles cut, narrow tunnels filled, Betti numbers |
 //! | [`contour`] | marching cubes and manifold dual contouring; of volumes in [`contour::volume`] |
 //! | [`volume`] | scalar fields on a lattice: arrays, functions, parts |
+//! | [`field`] | level sets on adaptive octrees: of functions, solids, points; booleans, offsets, morphs; hexahedra around bodies |
+//! | [`cloud`] | points: neighbours, planes, winding numbers, closed surfaces of them, ball pivoting, and points of meshes |
 //! | [`octree`] | [`LinearOctree`](octree::LinearOctree) of anything: refined, balanced, searched; crossings and signs in bricks |
 //! | [`grid`] | keys, axes, corners, bricks of bits, the 256 cases: integers only |
 //! | [`geom`] | the frame of the grid, exact rasterisation, normals in 16 bits, quadratic error functions |

@@ -121,19 +121,19 @@ fn operation(draw: &mut Draw<'_>, tree: &mut LinearOctree<u8>, oracle: &mut Orac
             }
         }
         3 => {
-            if let Some(leaf) = leaf(draw, oracle).filter(|leaf| leaf.level() < Some(18)) {
-                if tree.refine_strict(leaf, balance, |_, record| record.wrapping_add(2)).is_ok() {
-                    let old = oracle.remove(&leaf).expect("a leaf");
-                    oracle.extend(leaf.children().map(|child| (child, old.wrapping_add(2))));
-                }
+            if let Some(leaf) = leaf(draw, oracle).filter(|leaf| leaf.level() < Some(18))
+                && tree.refine_strict(leaf, balance, |_, record| record.wrapping_add(2)).is_ok()
+            {
+                let old = oracle.remove(&leaf).expect("a leaf");
+                oracle.extend(leaf.children().map(|child| (child, old.wrapping_add(2))));
             }
         }
         4 => {
-            if let Some(parent) = leaf(draw, oracle).and_then(Key::parent) {
-                if tree.coarsen(parent, balance, |records| records.into_iter().fold(0, u8::wrapping_add)).is_ok() {
-                    let records = parent.children().map(|child| oracle.remove(&child).expect("a family"));
-                    oracle.insert(parent, records.into_iter().fold(0, u8::wrapping_add));
-                }
+            if let Some(parent) = leaf(draw, oracle).and_then(Key::parent)
+                && tree.coarsen(parent, balance, |records| records.into_iter().fold(0, u8::wrapping_add)).is_ok()
+            {
+                let records = parent.children().map(|child| oracle.remove(&child).expect("a family"));
+                oracle.insert(parent, records.into_iter().fold(0, u8::wrapping_add));
             }
         }
         5 => {
@@ -145,7 +145,7 @@ fn operation(draw: &mut Draw<'_>, tree: &mut LinearOctree<u8>, oracle: &mut Orac
             }
         }
         6 => {
-            let keep = |key: Key, record: u8| (key.to_bits() >> 7 ^ u64::from(record)) % 8 > 0;
+            let keep = |key: Key, record: u8| !(key.to_bits() >> 7 ^ u64::from(record)).is_multiple_of(8);
             tree.retain(|key, record| keep(key, *record));
             oracle.retain(|&key, record| keep(key, *record));
         }

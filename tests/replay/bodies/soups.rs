@@ -69,7 +69,7 @@ fn options(draw: &mut Draw<'_>) -> Options {
 /// A few points, and polygons of any of them.
 fn soup(draw: &mut Draw<'_>) -> Mesh {
     let mut mesh = Mesh::default();
-    for _ in 0..1 + draw.below(24) {
+    for _ in 0..=draw.below(24) {
         // Points that are nowhere, or far away, are rare.
         let mut value = || if draw.byte() < 250 { VALUES[draw.below(14)] } else { VALUES[draw.below(16)] };
         mesh.points.push(DVec3::new(value(), value(), value()));
