@@ -198,7 +198,8 @@ fn a_plate_has_three_holes_of_three_sizes() {
         assert_near(found.area, disc(radius), "hole");
     }
     let (mesh, report) = mend(&plate, &Repair { genus: Some(2), ..Repair::default() });
-    assert_eq!((genera(&mesh), report.fills.len(), report.cuts.len()), (vec![2], 1, 0));
+    // A cut from the first hole to the rim changes fewer cells than its membrane, which has two beside each square.
+    assert_eq!((genera(&mesh), report.fills.len(), report.cuts.len()), (vec![2], 0, 1));
 }
 
 #[test]
@@ -421,7 +422,7 @@ fn a_sketch_says_what_the_topology_is() {
         ("theta.obj", format!("{circle}l 1 9\n"), 2, 0),
     ] {
         std::fs::write(folder.join(name), format!("{points}{lines}")).unwrap();
-        for surface in ["mc", "dc", "quads"] {
+        for surface in ["mc", "quads", "blocks"] {
             let told = json(folder, &format!("topology ring.sof out.ply --sketch {name} --surface {surface} --force"));
             assert_eq!((&told["output"]["genus"], &told["output"]["solid"]), (&genus.into(), &true.into()), "{name}");
             assert_eq!(told["topology"]["cuts"].as_array().unwrap().len(), cuts, "{name}");
