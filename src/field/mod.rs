@@ -1,6 +1,6 @@
 //! Level sets on octrees: functions of space, negative inside, sampled where it matters.
 //!
-//! A [`Field`] has values at the corners of the leaves of an octree and is continuous between them (see [`NodalOctree`]). It is made of any
+//! A [`Field`] has values at the corners of the leaves of an octree and is continuous between them (see [`NodalOctree`](crate::octree::NodalOctree)). It is made of any
 //! [`Function`], fine where the surface is curved and coarse elsewhere; of a mesh, by distance from the solid that it encloses, by
 //! [`Solid::distance_field`](crate::Solid::distance_field); or of [points](crate::cloud). Fields can be joined, cut, moved and mixed
 //! ([`union`](Field::union), [`intersection`](Field::intersection), [`difference`](Field::difference), [`offset`](Field::offset),
