@@ -412,3 +412,22 @@ fn check_harmless(bytes: &[u8], hint: Format) -> Result<(), TestCaseError> {
     }
     Ok(())
 }
+
+/// What the readers of others stumble over.
+#[test]
+fn long_lines_tiny_numbers_and_words_in_binary_headers_do_no_harm() {
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1.5e-9 0 0\nvertex 1 1 0\nendloop\nendfacet\n";
+    let text = format!("solid {}\n{facet}endsolid\n", "name ".repeat(2000));
+    let mesh = io::read_bytes("t.stl", text.as_bytes(), None).expect("valid");
+    assert_eq!((mesh.faces.len(), mesh.points.iter().filter(|p| p.x == 1.5e-9).count()), (1, 1));
+    for header in ["facet", "solid loop", "vertex of a facet in a loop", "solid facet loop vertex"] {
+        let mut bytes = header.as_bytes().to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend(1u32.to_le_bytes());
+        let floats: [f32; 12] = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0];
+        bytes.extend(floats.iter().flat_map(|x| x.to_le_bytes()));
+        bytes.extend([0, 0]);
+        let mesh = io::read_bytes("t.stl", &bytes, None).expect(header);
+        assert_eq!((mesh.faces.len(), mesh.points.len()), (1, 3), "{header}");
+    }
+}
