@@ -115,9 +115,9 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     Ok(Winding { octree, clipped })
 }
 
-/// The least whole number that is inside where the angle is `angle`.
+/// The least whole number that is inside where the angle is `angle`, which may be beyond all bounds beside a flattened rim.
 fn least(angle: f64) -> i32 {
-    (THRESHOLD - angle).floor() as i32 + 1
+    ((THRESHOLD - angle).floor() as i32).saturating_add(1)
 }
 
 /// Lets ties agree with their neighbours if these agree with each other. `ties` are sorted.
