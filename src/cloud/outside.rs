@@ -9,9 +9,8 @@ use crate::error::Result;
 use crate::geom::{Bounds, Frame};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Face, Key};
-use crate::octree::LinearOctree;
 use crate::octree::point_set::PointSet;
-use crate::octree::regions::{ClosedEdges, Regions};
+use crate::octree::regions::{ClosedBricks, Regions};
 use crate::progress::{Progress, check};
 use glam::DVec3;
 use hashbrown::HashMap;
@@ -26,53 +25,20 @@ const CLOSES: f64 = 1.5;
 const REACH: u32 = 5;
 
 /// The dilated points as closed edges: those with one end in the set.
-struct Wall {
-    depth: u32,
-    bricks: Vec<(Key, [Plane; 3])>,
-    index: LinearOctree<u32>,
-}
-
-impl Wall {
-    fn new(depth: u32, set: &PointSet) -> Wall {
-        // Edges belong to the brick they start in: also to those below the set.
-        let below = |key: Key| Axis::ALL.map(|axis| key.neighbour(Face::new(axis, false)));
-        let mut keys: Vec<Key> = set.keys();
-        keys.extend(set.keys().into_iter().flat_map(below).flatten());
-        keys.par_sort_unstable();
-        keys.dedup();
-        let closed = |key: Key| {
-            let here = set.plane(key);
-            Axis::ALL.map(|axis| {
-                let next = key.neighbour(Face::new(axis, true)).map_or(Plane::EMPTY, |next| set.plane(next));
-                here ^ here.at_plus(axis, &next)
-            })
-        };
-        let bricks: Vec<(Key, [Plane; 3])> = keys.into_par_iter().map(|key| (key, closed(key))).collect();
-        let index = bricks.iter().map(|b| b.0).zip(0..).collect();
-        Wall { depth, bricks, index }
-    }
-}
-
-impl ClosedEdges for Wall {
-    fn depth(&self) -> u32 {
-        self.depth
-    }
-
-    fn len(&self) -> usize {
-        self.bricks.len()
-    }
-
-    fn key(&self, brick: usize) -> Key {
-        self.bricks[brick].0
-    }
-
-    fn closed(&self, brick: usize) -> [Plane; 3] {
-        self.bricks[brick].1
-    }
-
-    fn find(&self, brick: Key) -> Option<usize> {
-        self.index.get(brick).map(|&i| i as usize)
-    }
+fn wall(depth: u32, set: &PointSet) -> ClosedBricks {
+    // Edges belong to the brick they start in: also to those below the set.
+    let below = |key: Key| Axis::ALL.map(|axis| key.neighbour(Face::new(axis, false)));
+    let mut keys: Vec<Key> = set.keys();
+    keys.extend(set.keys().into_iter().flat_map(below).flatten());
+    keys.par_sort_unstable();
+    keys.dedup();
+    ClosedBricks::new(depth, keys, |key, _| {
+        let here = set.plane(key);
+        Axis::ALL.map(|axis| {
+            let next = key.neighbour(Face::new(axis, true)).map_or(Plane::EMPTY, |next| set.plane(next));
+            here ^ here.at_plus(axis, &next)
+        })
+    })
 }
 
 /// A way out of a wall: the region it leads to and how far that is, in half cells.
@@ -117,7 +83,7 @@ pub(super) fn votes(points: &[DVec3], normals: &[DVec3], gap: f64, progress: &dy
         set = set.dilated();
     }
     progress.hold((set.bytes() + set.bricks() * size_of::<(Key, [Plane; 3])>()) as u64)?;
-    let wall = Wall::new(depth, &set);
+    let wall = wall(depth, &set);
     check(progress)?;
     let regions = Regions::new(&wall);
     let exit = |p: DVec3, way: DVec3| -> Exit {

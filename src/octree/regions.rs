@@ -17,6 +17,7 @@
 //! Per brick: a flood for each of its parts (most have two) and some six look-ups of neighbours, in parallel. While it lasts, 64 bytes a part
 //! and 28 a brick.
 
+use super::LinearOctree;
 use super::crossings::{Crossings, lattice_point};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Key};
@@ -41,6 +42,49 @@ pub trait ClosedEdges: Sync {
     fn closed(&self, brick: usize) -> [Plane; 3];
     /// The place of a brick in the list.
     fn find(&self, brick: Key) -> Option<usize>;
+}
+
+/// Closed edges in a list of bricks of their own.
+#[derive(Debug)]
+pub struct ClosedBricks {
+    depth: u32,
+    /// Key, and the closed edges along x, y, z, each at its start.
+    bricks: Vec<(Key, [Plane; 3])>,
+    index: LinearOctree<u32>,
+}
+
+impl ClosedBricks {
+    /// Bytes for each brick.
+    pub const BYTES: usize = size_of::<(Key, [Plane; 3])>() + 2 * size_of::<(Key, u32)>();
+
+    /// Asks for the closed edges of each brick, in parallel; the keys are sorted. `closed` is given the places of all keys, too.
+    pub fn new(depth: u32, keys: Vec<Key>, closed: impl Fn(Key, &LinearOctree<u32>) -> [Plane; 3] + Sync) -> Self {
+        let index: LinearOctree<u32> = keys.iter().copied().zip(0..).collect();
+        let bricks = keys.into_par_iter().map(|key| (key, closed(key, &index))).collect();
+        ClosedBricks { depth, bricks, index }
+    }
+}
+
+impl ClosedEdges for ClosedBricks {
+    fn depth(&self) -> u32 {
+        self.depth
+    }
+
+    fn len(&self) -> usize {
+        self.bricks.len()
+    }
+
+    fn key(&self, brick: usize) -> Key {
+        self.bricks[brick].0
+    }
+
+    fn closed(&self, brick: usize) -> [Plane; 3] {
+        self.bricks[brick].1
+    }
+
+    fn find(&self, brick: Key) -> Option<usize> {
+        self.index.get(brick).map(|&i| i as usize)
+    }
 }
 
 impl ClosedEdges for Crossings {

@@ -29,10 +29,9 @@ use crate::geom::Frame;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Face, Key};
 use crate::mesh::TriangleSource;
-use crate::octree::LinearOctree;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::{EdgeHit, OrientedHits};
-use crate::octree::regions::{ClosedEdges, REGION_BYTES, Regions};
+use crate::octree::regions::{ClosedBricks, ClosedEdges, REGION_BYTES, Regions};
 use crate::octree::signed::{GIVEN_BYTES, SignedOctree};
 use crate::progress::{Beside, Progress};
 use glam::Vec3;
@@ -93,7 +92,7 @@ pub fn hull_with_gap(
     let faces = Band::around(source, frame, radius, &Beside { progress, bytes: held as u64 })?;
     let held = held + faces.bytes() + faces.keys().len() * (WALL_BYTES + GIVEN_BYTES);
     progress.hold(held as u64)?;
-    let far = Walls::new(hits, &[&faces], |key| !faces.within(key, radius));
+    let far = walls(hits, &[&faces], |key| !faces.within(key, radius));
     let far_regions = Regions::new(&far);
     let outer = |key: Key| match far.find(key) {
         Some(i) => far_regions.points_in(i, |region| region == 0),
@@ -107,7 +106,7 @@ pub fn hull_with_gap(
     let most = faces.keys().len() + rim.keys().len();
     progress.hold((held + rim.bytes() + most * (WALL_BYTES + GIVEN_BYTES)) as u64)?;
     let grown = |key: Key| outer(key) | rim.within(key, radius + tolerance(radius));
-    let near = Walls::new(hits, &[&faces, &rim], grown);
+    let near = walls(hits, &[&faces, &rim], grown);
     let regions = Regions::new(&near);
 
     let signs: Vec<(Key, Plane)> = (0..near.len())
@@ -134,7 +133,7 @@ pub fn hull_with_gap(
 /// The surface on which the centre of the ball rolls: what the outside does not reach as long as it keeps its distance.
 fn rolled(
     hits: &OrientedHits,
-    far: &Walls,
+    far: &ClosedBricks,
     faces: &Band,
     radius: f64,
     outer: impl Fn(Key) -> Plane + Sync,
@@ -203,63 +202,24 @@ fn samples_of(
     found.into_iter().peekable()
 }
 
-/// Bytes for each brick of [`Walls`] and of their regions.
-const WALL_BYTES: usize =
-    size_of::<(Key, [Plane; 3])>() + size_of::<Plane>() + 2 * size_of::<(Key, u32)>() + REGION_BYTES;
+/// Bytes for each brick of walls and of their regions.
+const WALL_BYTES: usize = ClosedBricks::BYTES + size_of::<Plane>() + REGION_BYTES;
 
-/// Edges that are closed because a face hits them, or because just one of their ends lies in a set.
-struct Walls {
-    depth: u32,
-    bricks: Vec<(Key, [Plane; 3])>,
-    index: LinearOctree<u32>,
-}
-
-impl Walls {
-    /// All bricks of the hits and of some bands are listed; elsewhere the set must be uniform. What is beside the root is in it.
-    fn new(hits: &OrientedHits, bands: &[&Band], set: impl Fn(Key) -> Plane + Sync) -> Self {
-        let edges = hits.edges();
-        let mut keys: Vec<Key> = edges.bricks().iter().map(|b| b.key).collect();
-        bands.iter().for_each(|band| keys.extend(band.keys()));
-        keys.par_sort_unstable();
-        keys.dedup();
-        let sets: Vec<Plane> = keys.par_iter().map(|&key| set(key)).collect();
-        let mut index = LinearOctree::with_capacity(keys.len());
-        for (i, &key) in (0..).zip(&keys) {
-            index.insert(key, i);
-        }
-        let bricks = keys.into_par_iter().zip(&sets).map(|(key, here)| {
-            let hit = edges.find(key).map_or([Plane::EMPTY; 3], |i| edges.bricks()[i].crossed);
-            let closed = Axis::ALL.map(|axis| {
-                let next = key.neighbour(Face::new(axis, true)).map_or(Plane::FULL, |next| match index.get(next) {
-                    Some(&i) => sets[i as usize],
-                    None => set(next),
-                });
-                hit[axis.index()] | (*here ^ here.at_plus(axis, &next))
-            });
-            (key, closed)
-        });
-        Walls { depth: edges.depth(), bricks: bricks.collect(), index }
-    }
-}
-
-impl ClosedEdges for Walls {
-    fn depth(&self) -> u32 {
-        self.depth
-    }
-
-    fn len(&self) -> usize {
-        self.bricks.len()
-    }
-
-    fn key(&self, brick: usize) -> Key {
-        self.bricks[brick].0
-    }
-
-    fn closed(&self, brick: usize) -> [Plane; 3] {
-        self.bricks[brick].1
-    }
-
-    fn find(&self, brick: Key) -> Option<usize> {
-        self.index.get(brick).map(|&i| i as usize)
-    }
+/// Edges that are closed because a face hits them, or because just one of their ends lies in a set. All bricks of the hits and of some bands
+/// are listed; elsewhere the set must be uniform. What is beside the root is in it.
+fn walls(hits: &OrientedHits, bands: &[&Band], set: impl Fn(Key) -> Plane + Sync) -> ClosedBricks {
+    let edges = hits.edges();
+    let mut keys: Vec<Key> = edges.bricks().iter().map(|b| b.key).collect();
+    bands.iter().for_each(|band| keys.extend(band.keys()));
+    keys.par_sort_unstable();
+    keys.dedup();
+    let sets: Vec<Plane> = keys.par_iter().map(|&key| set(key)).collect();
+    ClosedBricks::new(edges.depth(), keys, |key, places| {
+        let set = |key| places.get(key).map_or_else(|| set(key), |&i| sets[i as usize]);
+        let (here, hit) = (set(key), edges.find(key).map_or([Plane::EMPTY; 3], |i| edges.bricks()[i].crossed));
+        Axis::ALL.map(|axis| {
+            let next = key.neighbour(Face::new(axis, true)).map_or(Plane::FULL, &set);
+            hit[axis.index()] | (here ^ here.at_plus(axis, &next))
+        })
+    })
 }
