@@ -15,14 +15,6 @@ use zmend::contour::volume::{ExtractOptions, Method, extract};
 use zmend::progress::Silent;
 use zmend::volume::Dense;
 
-const METHODS: [Method; 5] = [
-    Method::MarchingCubes,
-    Method::Trilinear,
-    Method::ExtendedMarchingCubes,
-    Method::SurfaceNets,
-    Method::DualContouring,
-];
-
 /// Samples of a function of the place, in sides of the volume from its middle.
 fn samples(side: usize, field: impl Fn([f32; 3]) -> f32) -> Vec<f32> {
     let place = |c: usize| (c as f32 + 0.5) / side as f32 - 0.5;
@@ -43,7 +35,7 @@ fn volumes(c: &mut Criterion) {
         let mut group = c.benchmark_group(format!("{name}-{side}"));
         group.throughput(Throughput::Elements(values.len() as u64)).sample_size(10);
         let volume = Dense::new(&values, [side; 3]).expect("as many samples as that");
-        for method in METHODS {
+        for method in Method::ALL {
             let options = ExtractOptions { method, ..ExtractOptions::default() };
             let run = || {
                 let mut mesh = Mesh::default();

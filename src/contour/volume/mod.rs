@@ -77,6 +77,17 @@ pub enum Method {
     ExtendedMarchingCubes,
 }
 
+impl Method {
+    /// All methods.
+    pub const ALL: [Method; 5] = [
+        Method::MarchingCubes,
+        Method::Trilinear,
+        Method::DualContouring,
+        Method::SurfaceNets,
+        Method::ExtendedMarchingCubes,
+    ];
+}
+
 /// What happens where the surface leaves the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Border {

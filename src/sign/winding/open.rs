@@ -115,7 +115,7 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     Ok(Winding { octree, clipped })
 }
 
-/// The least whole number that is inside where the angle is `angle`, which may be beyond all bounds beside a flattened rim.
+/// The least whole number that is inside where the angle is `angle`: bounds of angles beside a rim may be far beyond all whole numbers.
 fn least(angle: f64) -> i32 {
     ((THRESHOLD - angle).floor() as i32).saturating_add(1)
 }

@@ -25,14 +25,6 @@ const VALUES: [f32; 16] = [
     1e-3,
     7.0,
 ];
-const METHODS: [Method; 5] = [
-    Method::MarchingCubes,
-    Method::Trilinear,
-    Method::DualContouring,
-    Method::SurfaceNets,
-    Method::ExtendedMarchingCubes,
-];
-
 pub(crate) fn extracted(bytes: &[u8]) {
     let mut draw = Draw::new(bytes);
     let size: [usize; 3] = [(); 3].map(|()| 1 + draw.below(7));
@@ -43,7 +35,7 @@ pub(crate) fn extracted(bytes: &[u8]) {
     let samples: Vec<f32> = (0..size.iter().product::<usize>()).map(|_| VALUES[draw.below(kinds)]).collect();
     let volume = Dense::new(&samples, size).expect("as many as there are");
     let mut eulers = Vec::new();
-    for method in METHODS {
+    for method in Method::ALL {
         let level = if is_below { Level::below(level) } else { Level::above(level) };
         let mut mesh = Mesh::default();
         let options = ExtractOptions { level, method, ..ExtractOptions::default() };
@@ -56,7 +48,7 @@ pub(crate) fn extracted(bytes: &[u8]) {
                 eulers[0].1,
                 eulers.last().expect("just pushed").1,
                 "{method:?} has the topology of {:?}",
-                METHODS[0]
+                Method::ALL[0]
             );
         }
     }

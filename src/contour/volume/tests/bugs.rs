@@ -12,7 +12,7 @@ fn by(method: Method) -> ExtractOptions {
 fn ties_on_open_faces_do_not_crack() {
     // A chess board: every face of every cell is open, every saddle is 0.
     let board = Samples::new([9; 3], |at| if at.iter().sum::<usize>() % 2 == 0 { 1.0 } else { -1.0 });
-    for method in METHODS {
+    for method in Method::ALL {
         let mesh = extracted(&board, &by(method));
         assert_eq!((mesh.validate(), mesh.report().zero_area_faces), (Ok(()), 0), "{method:?}");
     }
@@ -22,7 +22,7 @@ fn ties_on_open_faces_do_not_crack() {
 #[test]
 fn samples_at_the_level_are_outside_for_all() {
     let values: [f32; 27] = std::array::from_fn(|i| if i == 13 { 1.0 } else { 0.0 });
-    for method in METHODS {
+    for method in Method::ALL {
         let mesh = surface(&values, [3; 3], &by(method));
         let report = mesh.report();
         assert_eq!((mesh.validate(), report.zero_area_faces, report.components), (Ok(()), 0, 1), "{method:?}");
@@ -56,7 +56,7 @@ fn parts_have_the_surface_of_a_copy() {
         .map(|i| [i % part[0], i / part[0] % part[1], i / (part[0] * part[1])])
         .map(|at| whole.value([0, 1, 2].map(|a| at[a] + first[a])) as f32)
         .collect();
-    for method in METHODS {
+    for method in Method::ALL {
         let cropped = extracted(&Cropped::new(whole, first, part).unwrap(), &by(method));
         let copied = surface(&copy, part, &by(method));
         // Normals look beyond the part, where the copy has nothing.
@@ -75,7 +75,7 @@ fn no_edge_is_longer_than_its_cells() {
         let middle = DVec3::from(size.map(|n| 0.5 * n as f64));
         // Cut by both borders along x.
         let ball = LevelSet::new(size, move |p: DVec3| middle.x + 1.0 - (p - middle).length());
-        for (method, border) in METHODS.into_iter().flat_map(|m| [(m, Border::Closed), (m, Border::Open)]) {
+        for (method, border) in Method::ALL.into_iter().flat_map(|m| [(m, Border::Closed), (m, Border::Open)]) {
             let mesh = extracted(&ball, &ExtractOptions { border, ..by(method) });
             assert!(mesh.report().max_edge < 2.0 * 3f64.sqrt(), "{method:?} {size:?}");
         }
@@ -114,7 +114,7 @@ fn volumes_may_have_more_samples_than_32_bits_count() {
 #[test]
 fn doubles_stay_doubles() {
     let step = Samples::new([12, 3, 3], |[x, _, _]| 1.0 + 1e-12 * (x as f64 - 5.25));
-    for method in METHODS {
+    for method in Method::ALL {
         let options = ExtractOptions { level: Level::above(1.0), border: Border::Open, ..by(method) };
         let bounds = extracted(&step, &options).report().bounds;
         assert!((bounds.min.x - 5.25).abs().max((bounds.max.x - 5.25).abs()) < 1e-3, "{method:?} {bounds:?}");
@@ -125,7 +125,7 @@ fn doubles_stay_doubles() {
 #[test]
 fn what_a_mesh_held_is_replaced() {
     let ball = Samples::new([9; 3], |at| 3.2 - (DVec3::from(at.map(|c| c as f64)) - 4.0).length());
-    for method in METHODS {
+    for method in Method::ALL {
         let once = extracted(&ball, &by(method));
         let mut twice = once.clone();
         extract(&(&ball as &dyn Volume), &by(method), &mut twice, &Silent).unwrap();
@@ -140,7 +140,7 @@ fn surfaces_may_be_far_apart() {
         let distance = |c: [f64; 3]| (DVec3::new(x as f64, y as f64, z as f64) - DVec3::from(c)).length();
         4.2 - distance([5.0, 6.0, 5.0]).min(distance([120.0, 33.0, 6.0])).min(distance([64.0, 20.0, 52.0]))
     });
-    for method in METHODS {
+    for method in Method::ALL {
         let mesh = extracted(&balls, &by(method));
         assert_eq!((mesh.validate(), mesh.report().components, mesh.report().euler), (Ok(()), 3, 6), "{method:?}");
     }

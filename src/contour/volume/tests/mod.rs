@@ -45,14 +45,6 @@ fn cells(size: usize, field: impl Fn(DVec3) -> f64 + Sync, method: Method) -> Me
     extracted(&LevelSet::new([size; 3], field), &ExtractOptions { method, ..ExtractOptions::default() })
 }
 
-const METHODS: [Method; 5] = [
-    Method::MarchingCubes,
-    Method::Trilinear,
-    Method::DualContouring,
-    Method::SurfaceNets,
-    Method::ExtendedMarchingCubes,
-];
-
 /// Closed, manifold, outward, without faces of no area: for random volumes of all kinds, in every method; and all that go by signs have the same
 /// topology. `ZMEND_RANDOM_VOLUMES` says how many of each kind and method; 2 if it does not.
 #[test]
@@ -63,7 +55,7 @@ fn random_volumes_have_closed_surfaces() {
             [[24, 24, 24], [62, 5, 7], [63, 3, 3], [130, 4, 2]][if seed % 16 == 1 { 1 + seed / 16 % 3 } else { 0 }];
         let values = random(kind, size, seed as u64);
         let mut topology = None;
-        for method in METHODS {
+        for method in Method::ALL {
             let mesh = surface(&values, size, &ExtractOptions { method, ..ExtractOptions::default() });
             assert_eq!(mesh.validate(), Ok(()), "{method:?}, kind {kind}, seed {seed}");
             let report = mesh.report();
@@ -84,7 +76,7 @@ fn random_volumes_have_closed_surfaces() {
 /// A ball in the model, on a lattice that is fine along z, turned or mirrored: always outward, and where it should be.
 #[test]
 fn placements_are_honoured() {
-    for (method, mirrored) in METHODS.into_iter().flat_map(|m| [(m, false), (m, true)]) {
+    for (method, mirrored) in Method::ALL.into_iter().flat_map(|m| [(m, false), (m, true)]) {
         let turn = DMat3::from_rotation_x(0.4);
         let axes = turn * DMat3::from_diagonal(DVec3::new(if mirrored { -1.0 } else { 1.0 }, 1.0, 0.5));
         let middle = DVec3::new(12.0, 12.0, 24.0);
@@ -107,7 +99,7 @@ fn placements_are_honoured() {
 #[test]
 fn borders_close_or_stay_open() {
     let full = [1u8; 60];
-    for method in METHODS {
+    for method in Method::ALL {
         let dense = Dense::new(&full, [3, 4, 5]).unwrap();
         let options = ExtractOptions { method, level: Level::above(0.5), ..ExtractOptions::default() };
         let closed = extracted(&dense, &options);
@@ -146,7 +138,7 @@ fn invalid_cells_are_left_out() {
         }
     }
     let ball: fn(DVec3) -> f64 = |p| 7.2 - (p - DVec3::new(9.6, 9.7, 9.8)).length();
-    for method in METHODS {
+    for method in Method::ALL {
         let holed = Holed(LevelSet::new([20; 3], ball));
         let mesh = extracted(&holed, &ExtractOptions { method, ..ExtractOptions::default() });
         let report = mesh.report();
@@ -162,7 +154,7 @@ fn invalid_cells_are_left_out() {
 fn threads_make_no_difference() {
     let size = [40, 33, 70];
     let values = random(0, size, 5);
-    for method in METHODS {
+    for method in Method::ALL {
         let options = ExtractOptions { method, ..ExtractOptions::default() };
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -184,7 +176,7 @@ fn bad_settings_are_refused() {
     assert!(refuse(ExtractOptions { placement: flat, ..good }).starts_with("placement: "));
     for size in [[0, 5, 5], [1, 1, 1], [1, 7, 2]] {
         let values = vec![1u16; size.iter().product()];
-        for (method, border) in METHODS.into_iter().flat_map(|m| [(m, Border::Closed), (m, Border::Open)]) {
+        for (method, border) in Method::ALL.into_iter().flat_map(|m| [(m, Border::Closed), (m, Border::Open)]) {
             let options = ExtractOptions { method, border, level: Level::above(0.5), ..good };
             let mesh = extracted(&Dense::new(&values, size).unwrap(), &options);
             assert_eq!(mesh.validate(), Ok(()));

@@ -57,7 +57,7 @@ fn tunnels_lead_through_cells() {
         // Two cavities in a block, which are one.
         let holes = [[3, 3, 3], [3 + step[0], 3 + step[1], 3 + step[2]]];
         let block = Samples::new([7; 3], |at| if holes.contains(&at.map(|c| c as i32)) { -1.0 } else { 1.0 });
-        for method in METHODS.into_iter().filter(|&method| method != Method::Trilinear) {
+        for method in Method::ALL.into_iter().filter(|&method| method != Method::Trilinear) {
             let mesh = extracted(&block, &ExtractOptions { method, ..ExtractOptions::default() });
             assert_eq!(topology(&mesh), [2, 2], "{method:?} {step:?}");
         }
