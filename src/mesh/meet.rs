@@ -40,6 +40,10 @@ fn sign(determinant: f64) -> i8 {
 
 /// On which side of the plane through three points a fourth one is.
 fn side(&[a, b, c]: &Triangle, p: DVec3) -> i8 {
+    // Planes across an axis are common, and the slowest of all to decide by a determinant: it is 0 there.
+    if (a.cmpeq(p) & b.cmpeq(p) & c.cmpeq(p)).any() {
+        return 0;
+    }
     let [a, b, c, p] = [a, b, c, p].map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
     sign(orient3d(a, b, c, p))
 }

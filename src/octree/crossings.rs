@@ -155,6 +155,17 @@ pub fn check_count(crossings: u64) -> Result<()> {
     Err(Error::setting("depth", problem, "take a smaller depth"))
 }
 
+/// The same edges are crossed, at the same places. The index is not compared: it follows from the bricks.
+impl PartialEq for Crossings {
+    fn eq(&self, other: &Self) -> bool {
+        let Crossings { depth, index: _, bricks, offsets, normals, with_normals } = self;
+        (*depth, *with_normals) == (other.depth, other.with_normals)
+            && *bricks == other.bricks
+            && *offsets == other.offsets
+            && *normals == other.normals
+    }
+}
+
 impl Crossings {
     /// log2 of the number of cells a side.
     pub fn depth(&self) -> u32 {

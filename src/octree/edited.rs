@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Signs of lattice points, and finest elements that are exceptions to them.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EditedOctree {
     signed: SignedOctree,
     removed: Vec<Key>,

@@ -19,7 +19,7 @@ pub const GIVEN_BYTES: usize =
 /// Crossed edges together with the signs of the lattice points.
 ///
 /// Signs are stored for the points of bricks; everywhere else they are uniform up to the next brick and follow from it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SignedOctree {
     crossings: Crossings,
     /// For each brick, the points that are inside.

@@ -30,7 +30,7 @@ use crate::topology::{self, Round, TopologyReport, repair_topology_watched};
 /// solid.extract(&options, &mut mesh, &Silent)?;
 /// # Ok::<(), zmend::Error>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     /// Inside and outside, and what topology repair made of it.
     pub octree: EditedOctree,
