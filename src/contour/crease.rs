@@ -35,6 +35,8 @@
 //!   point, and its vertex stays in its cell, as ever. Only if the cell that has the point has no vertex of its own,
 //!   the sheet bulges into it, and may go there in any case.
 //! - The point is at most a cell away from the cell, and in the grid.
+//! - It is not [behind](is_behind) the only corner that is inside, or outside: three planes meet somewhere in any case, and the vertices of
+//!   eight cells round a tip of a few tenths of a cell went past it and each other, the surface inside out.
 //!
 //! Vertices that leave are drawn to their mass points a little ([`APART`]), for up to four cells may look for the same
 //! point. Along the crease they come in the order of their mass points, which may differ from that of the surface by
@@ -57,6 +59,8 @@
 
 use super::dual::Placement;
 use crate::geom::qef::Qef;
+use crate::grid::cases::Mask;
+use crate::grid::{Axis, Corner};
 use glam::Vec3A;
 
 /// Vertices keep this distance from the sides of their cell, in cells.
@@ -128,6 +132,19 @@ pub(super) fn common_point(corner: Vec3A, whole: &Qef, beyond: &dyn Fn(Vec3A) ->
     let free = whole.minimiser();
     let is_sharp = whole.flatness() < CREASED && whole.mean_square(free) < SHARP;
     (is_sharp && is_near(corner, corner + 1.0, free) && beyond(free) != Beyond::Barred).then_some(free)
+}
+
+/// Whether a point is on the other side of the only corner of its sign, in a cell with the least corner `corner`: beyond it along two axes or
+/// more.
+pub(super) fn is_behind(corner: Vec3A, mask: Mask, p: Vec3A) -> bool {
+    let only = match mask.count_ones() {
+        1 => Corner::ALL[mask.trailing_zeros() as usize],
+        7 => Corner::ALL[mask.trailing_ones() as usize],
+        _ => return false,
+    };
+    let p = p - corner;
+    let is_beyond = |a: &Axis| if only.is_high(*a) { p[a.index()] > 1.0 } else { p[a.index()] < 0.0 };
+    Axis::ALL.iter().filter(|a| is_beyond(a)).count() >= 2
 }
 
 /// Whether a point is at most a cell away from the box along each axis.

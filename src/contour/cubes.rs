@@ -10,17 +10,18 @@
 use super::PIECE;
 use crate::error::Result;
 use crate::geom::Frame;
-use crate::grid::brick::Local;
+use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::CASES;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
-use crate::octree::cells::{Cells, EdgeTable};
+use crate::octree::cells::{Cells, EdgeTable, place_of};
 use crate::octree::crossings::{Crossings, position};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::LazyLock;
 
 /// Passes the surface of the octree to `sink` as triangles; returns its size. Cost: about 25 ns a crossed edge, and memory for a
 /// few thousand cells a thread.
@@ -85,36 +86,80 @@ fn count_triangles(octree: &SignedOctree) -> u64 {
 fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
     let places = crossings.places(range.clone());
     let mut points = Vec::with_capacity(places.len());
-    let mut place = places.start;
+    let mut offsets = crossings.offsets().range(places).copied();
     for brick in range.map(|i| &crossings.bricks()[i]) {
         // The brick's lattice planes in model space.
         let origin = DVec3::from(crossings.origin(brick).map(f64::from));
         let lattice: [DVec3; 8] = std::array::from_fn(|i| frame.to_model(origin + i as f64));
-        for (axis, plane) in brick.crossed.iter().enumerate() {
-            let along = DVec3::AXES[axis] * frame.cell_size();
-            plane.iter().for_each(|local| {
-                let [x, y, z] = local.coords().map(|c| c as usize);
-                let start = DVec3::new(lattice[x].x, lattice[y].y, lattice[z].z);
-                points.push(start + along * position(crossings.offsets()[place]));
-                place += 1;
-            });
-        }
+        let [x, y, z] = &brick.crossed;
+        points_along::<0>(x, &lattice, frame.cell_size(), &mut offsets, &mut points);
+        points_along::<1>(y, &lattice, frame.cell_size(), &mut offsets, &mut points);
+        points_along::<2>(z, &lattice, frame.cell_size(), &mut offsets, &mut points);
     }
     points
 }
 
+/// Appends the points of a brick's crossings along one axis.
+#[inline]
+fn points_along<const AXIS: usize>(
+    crossed: &Plane,
+    lattice: &[DVec3; 8],
+    cell_size: f64,
+    offsets: &mut impl Iterator<Item = u16>,
+    points: &mut Vec<DVec3>,
+) {
+    for (x, &word) in crossed.0.iter().enumerate() {
+        points.extend(Bits(word).zip(&mut *offsets).map(|(b, offset)| {
+            let b = b as usize;
+            let mut point = [lattice[x].x, lattice[b >> 3 & 7].y, lattice[b & 7].z];
+            point[AXIS] += cell_size * position(offset);
+            DVec3::from(point)
+        }));
+    }
+}
+
+/// Corners of triangles that most cells have: those of a cycle of up to four edges.
+const USUAL: usize = 6;
+/// Corners of triangles that a cell may have.
+const MOST: usize = 24;
+
+/// The triangles of a case as [places](place_of) of their corners' edges.
+#[derive(Clone, Copy)]
+struct Places {
+    count: u16,
+    at: [u16; MOST],
+}
+
+static PLACES: LazyLock<[Places; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|mask| {
+        let edges = CASES[mask].triangles.as_flattened();
+        assert!(edges.len() <= MOST, "case {mask}");
+        let mut places = Places { count: edges.len() as u16, at: [0; MOST] };
+        places.at.iter_mut().zip(edges).for_each(|(at, &edge)| *at = place_of(edge));
+        places
+    })
+});
+
 #[inline(never)]
 fn triangles_of(octree: &SignedOctree, numbers: &mut EdgeTable<u32>, range: Range<usize>) -> Vec<u32> {
     let mut corners = Vec::with_capacity(7 * octree.crossings().places(range.clone()).len());
-    let cases = &*CASES;
+    let mut made = 0;
+    let places = &*PLACES;
     for i in range {
         let cells = Cells::new(octree, i);
         numbers.fill(&cells, |crossing| crossing.number);
+        // Room for a cell is a slice of known length, and six corners are written without asking how many there are.
+        let room = made + MOST * cells.mixed().count() as usize;
+        corners.resize(room.max(corners.len()), 0);
         cells.for_mixed(|cell, mask| {
-            let triangles = &cases[usize::from(mask)].triangles;
-            let point = numbers.at(cell);
-            corners.extend(triangles.as_flattened().iter().map(|&edge| point(edge)));
+            let Places { count, at } = &places[usize::from(mask)];
+            let point = numbers.around(cell);
+            let room: &mut [u32; MOST] = (&mut corners[made..made + MOST]).try_into().expect("as many");
+            (0..USUAL).for_each(|i| room[i] = point(at[i]));
+            (USUAL..usize::from(*count)).for_each(|i| room[i] = point(at[i]));
+            made += usize::from(*count);
         });
     }
+    corners.truncate(made);
     corners
 }

@@ -1,6 +1,6 @@
 //! Where the vertices of dual surfaces go: the planes of their cells, added up; [`crease`](super::crease) finds the point.
 
-use super::crease::{APART, Beyond, common_point, is_creased, solve};
+use super::crease::{APART, Beyond, common_point, is_behind, is_creased, solve};
 use super::dual::Placement;
 use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
@@ -78,7 +78,12 @@ impl Planes {
         mixed.iter().for_each(|cell| {
             let place = |p| place(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
-                None => self.place_ordinary(cell, placement, given(cell), &beyond, place),
+                None => {
+                    let beyond = |p| {
+                        if is_behind(least_corner(cell), cells.mask(cell), p) { Beyond::Barred } else { beyond(p) }
+                    };
+                    self.place_ordinary(cell, placement, given(cell), &beyond, place)
+                }
                 Some(_) if layout.style == Style::Disjoint => self.skip_knot(cell),
                 Some(&knot) => self.place_knot(knot, placement, given(cell), &beyond, place),
             };

@@ -130,8 +130,13 @@ pub(crate) struct Crossing {
     pub(crate) starts_inside: bool,
 }
 
-/// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale.
-pub(crate) struct EdgeTable<T>(Box<[T; 3 * LAYER]>);
+/// Entries from that of a cell's first edge on, among which are those of all of its edges; a power of two, so that masked indices need no
+/// check.
+const REACH: usize = 2048;
+
+/// One entry for each edge of a brick's cells. Entries of edges that are not crossed are stale. Behind the last layer is room for the
+/// reach of the last cell.
+pub(crate) struct EdgeTable<T>(Box<[T; 7 * (STEP[0] + STEP[1] + STEP[2]) + REACH]>);
 
 /// Where bit b of a plane's word stands in a layer of the table.
 static AT: [u8; 64] = {
@@ -146,6 +151,7 @@ static AT: [u8; 64] = {
 
 /// How far the entry of each edge of a cell is from that of its first edge. Sixteen, so that masked indices need no check.
 static EDGE_AT: [u16; 16] = {
+    assert!(2 * LAYER + STEP[0] + STEP[1] < REACH, "an edge along z is farthest");
     let mut at = [0; 16];
     let mut i = 0;
     while i < 12 {
@@ -164,17 +170,31 @@ static EDGE_AT: [u16; 16] = {
     at
 };
 
+/// Where the entry of an edge is among those [around](EdgeTable::around) a cell.
+#[inline]
+pub(crate) fn place_of(edge: Edge) -> u16 {
+    EDGE_AT[edge.index() & 15]
+}
+
 impl<T: Copy> EdgeTable<T> {
     pub(crate) fn new(empty: T) -> Self {
-        EdgeTable(Box::new([empty; 3 * LAYER]))
+        EdgeTable(Box::new([empty; 7 * (STEP[0] + STEP[1] + STEP[2]) + REACH]))
     }
 
     /// The entries of the edges of a cell of the brick last filled in. Only crossed edges have any.
     #[inline]
     pub(crate) fn at(&self, cell: Local) -> impl Fn(Edge) -> T + '_ {
+        let entry = self.around(cell);
+        move |edge| entry(place_of(edge))
+    }
+
+    /// The same by [`place_of`] an edge, for who looks those up beforehand.
+    #[inline]
+    pub(crate) fn around(&self, cell: Local) -> impl Fn(u16) -> T + '_ {
         let [x, y, z] = cell.coords().map(|c| c as usize);
-        let entries = &self.0[x * STEP[0] + y * STEP[1] + z..];
-        move |edge| entries[usize::from(EDGE_AT[edge.index() & 15])]
+        let first = x * STEP[0] + y * STEP[1] + z * STEP[2];
+        let entries: &[T; REACH] = self.0[first..first + REACH].try_into().expect("as many");
+        move |place| entries[usize::from(place) % REACH]
     }
 
     /// Makes an entry for each crossing round the cells of a brick.

@@ -165,6 +165,8 @@ fn drawn_options(number: u64, mesh: &Mesh, chance: &mut Chance, words: &mut Vec<
     if inside == Inside::Hull && chance.below(2) == 0 {
         options.gap = gap;
     }
+    // It grows with the wider one of both.
+    let wall = wall.map(|wall| wall * (1.0 + options.gap.unwrap_or(0.0) / extent));
     match chance.below(16) {
         0 => options.thicken = wall,
         1 => (options.thicken, options.thicken_what) = (wall, Thicken::All),
