@@ -14,7 +14,7 @@ use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::CASES;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
-use crate::octree::cells::{Cells, EdgeTable, place_of};
+use crate::octree::cells::{CellEdges, Cells, EdgeTable, place_of};
 use crate::octree::crossings::{Crossings, position};
 use crate::parallel::{in_order, pieces};
 use crate::progress::{Progress, Stage};
@@ -71,12 +71,17 @@ pub fn marching_cubes(
 #[inline(never)]
 fn count_triangles(octree: &SignedOctree) -> u64 {
     let of_brick = |i: usize| {
-        let cells = Cells::new(octree, i);
-        let knotty = |cell: Local| {
+        let edges = CellEdges::new(octree, i);
+        let (mixed, knotty) = (i64::from(edges.mixed().count()), edges.knotty());
+        if knotty == Plane::EMPTY {
+            return -2 * mixed;
+        }
+        let cells = edges.with_corners();
+        let correction = |cell: Local| {
             let case = &CASES[usize::from(cells.mask(cell))];
             case.triangles.len() as i64 + 2 - case.cycles.iter().map(Vec::len).sum::<usize>() as i64
         };
-        cells.knotty().iter().map(knotty).sum::<i64>() - 2 * i64::from(cells.mixed().count())
+        knotty.iter().map(correction).sum::<i64>() - 2 * mixed
     };
     let corrections: i64 = (0..octree.crossings().bricks().len()).into_par_iter().map(of_brick).sum();
     (4 * octree.crossings().len() as i64 + corrections) as u64

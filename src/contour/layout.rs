@@ -9,7 +9,7 @@ use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::{CASES, Mask};
 use crate::grid::{Axis, Corner, Key};
 use crate::octree::SignedOctree;
-use crate::octree::cells::Cells;
+use crate::octree::cells::CellEdges;
 use crate::octree::crossings::toward;
 use rayon::prelude::*;
 
@@ -55,10 +55,14 @@ impl<'a> Layout<'a> {
         let found: Vec<(Plane, Vec<Knot>)> = (0..octree.crossings().bricks().len())
             .into_par_iter()
             .map(|i| {
-                let cells = Cells::new(octree, i);
-                let knotty = cells.knotty();
+                let edges = CellEdges::new(octree, i);
+                let (mixed, knotty) = (edges.mixed(), edges.knotty());
+                if knotty == Plane::EMPTY {
+                    return (mixed, Vec::new());
+                }
+                let cells = edges.with_corners();
                 let knots = knotty.iter().map(|cell| Knot { cell, mask: cells.mask(cell) });
-                (cells.mixed(), knots.filter(|k| CASES[usize::from(k.mask)].sheets.vertices > 1).collect())
+                (mixed, knots.filter(|k| CASES[usize::from(k.mask)].sheets.vertices > 1).collect())
             })
             .collect();
         let mut layout =

@@ -71,15 +71,33 @@ pub fn rasterise(triangle: &FineTriangle, shift: u32, hits: &mut impl Hits) {
             turned = !turned;
         }
     }
+    // Corners are sorted along x.
+    let ceil = |x: i32| (i64::from(x) + (1 << shift) - 1) >> shift;
+    let of = |a: usize| (ceil(t[0][a].min(t[1][a]).min(t[2][a])), ceil(t[0][a].max(t[1][a]).max(t[2][a])));
+    let ranges = [(ceil(t[0][0]), ceil(t[2][0])), of(1), of(2)];
+    let [x, y, z] = ranges.map(|(first, end)| first < end);
+    if !(x && (y || z) || y && z) {
+        return;
+    }
     let t = t.map(|p| p.map(i64::from));
     let e = std::array::from_fn::<_, 3, _>(|a| t[1][a] - t[0][a]);
     let f = std::array::from_fn::<_, 3, _>(|a| t[2][a] - t[0][a]);
     let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
     // Seen along y, with u = x and v = z, the axes have the other handedness.
-    Projection::new::<1, 2, 0>(&t, n, n[0] > 0, shift, turned).scan(Axis::X, hits);
-    Projection::new::<0, 2, 1>(&t, n, n[1] < 0, shift, turned).scan(Axis::Y, hits);
-    Projection::new::<0, 1, 2>(&t, n, n[2] > 0, shift, turned).scan(Axis::Z, hits);
+    if y && z {
+        Projection::new::<1, 2, 0>(&t, n, &ranges, n[0] > 0, shift, turned).scan(Axis::X, hits);
+    }
+    if x && z {
+        Projection::new::<0, 2, 1>(&t, n, &ranges, n[1] < 0, shift, turned).scan(Axis::Y, hits);
+    }
+    if x && y {
+        Projection::new::<0, 1, 2>(&t, n, &ranges, n[2] > 0, shift, turned).scan(Axis::Z, hits);
+    }
 }
+
+/// Lattice coordinates of which lines may pass: the first, and the one after the last. Strictly after the least coordinate of the triangle and
+/// not after the greatest, once the lattice has moved a little up.
+type LatticeRange = (i64, i64);
 
 /// A triangle seen along one axis: u and v are the other two axes, in order.
 struct Projection {
@@ -87,6 +105,8 @@ struct Projection {
     corners: [[i64; 3]; 3],
     /// Normal along (u, v, w).
     normal: [i64; 3],
+    columns: LatticeRange,
+    rows: LatticeRange,
     /// Whether the corners run counter-clockwise in the (u, v) plane.
     ccw: bool,
     shift: u32,
@@ -106,19 +126,13 @@ impl Projection {
     fn new<const U: usize, const V: usize, const W: usize>(
         t: &[[i64; 3]; 3],
         n: [i64; 3],
+        ranges: &[LatticeRange; 3],
         ccw: bool,
         shift: u32,
         turned: bool,
     ) -> Self {
-        Projection { corners: t.map(|p| [p[U], p[V], p[W]]), normal: [n[U], n[V], n[W]], ccw, shift, turned }
-    }
-
-    /// Lattice coordinates strictly after `min` and not after `max`, once the lattice has moved a little up.
-    #[inline]
-    fn lattice_range(&self, axis: usize) -> (i64, i64) {
-        let [a, b, c] = self.corners.map(|p| p[axis]);
-        let ceil = |x: i64| (x + (1 << self.shift) - 1) >> self.shift;
-        (ceil(a.min(b).min(c)), ceil(a.max(b).max(c)))
+        let (corners, normal) = (t.map(|p| [p[U], p[V], p[W]]), [n[U], n[V], n[W]]);
+        Projection { corners, normal, columns: ranges[U], rows: ranges[V], ccw, shift, turned }
     }
 
     /// The side of the edge from corner `i` to corner `j` on which the triangle lies, relative to line (`column`, `row`).
@@ -133,8 +147,8 @@ impl Projection {
 
     #[inline]
     fn scan(&self, axis: Axis, hits: &mut impl Hits) {
-        let (columns, rows) = (self.lattice_range(0), self.lattice_range(1));
-        if columns.0 >= columns.1 || rows.0 >= rows.1 || self.normal[2] == 0 {
+        let (columns, rows) = (self.columns, self.rows);
+        if self.normal[2] == 0 {
             return;
         }
         let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.half_plane(i, j, columns.0, rows.0));

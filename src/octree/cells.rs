@@ -6,18 +6,25 @@ use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::cases::Mask;
 use crate::grid::{Axis, Edge};
 
-/// For each cell of a brick (named by its least corner): which of its edges are crossed, which of its corners are inside.
-pub(crate) struct Cells<'a> {
+/// For each cell of a brick (named by its least corner): which of its edges are crossed.
+pub(crate) struct CellEdges<'a> {
     brick: &'a Brick,
     /// The bricks at +x, +y, +z, +x+y, +x+z, +y+z.
     plus: [&'a Brick; 6],
     /// By the number of the edge in the cell.
     edges: [Plane; 12],
+    /// The least corners that are inside.
+    inside: Plane,
+}
+
+/// For each cell of a brick: which of its edges are crossed, which of its corners are inside.
+pub(crate) struct Cells<'a> {
+    edges: CellEdges<'a>,
     /// By the number of the corner.
     corners: [Plane; 8],
 }
 
-impl<'a> Cells<'a> {
+impl<'a> CellEdges<'a> {
     /// Brick number `i` of the octree.
     pub(crate) fn new(octree: &'a SignedOctree, i: usize) -> Self {
         let crossings = octree.crossings();
@@ -39,12 +46,17 @@ impl<'a> Cells<'a> {
             z.at_plus_x(&px[2]),
             z.at_plus_x(&px[2]).at_plus_y(&py[2].at_plus_x(&pxy[2])),
         ];
+        CellEdges { brick, plus, edges, inside: octree.inside()[i] }
+    }
+
+    /// The corners, too.
+    pub(crate) fn with_corners(self) -> Cells<'a> {
         // The sign changes along a crossed edge: corners follow from the least one.
-        let c0 = octree.inside()[i];
+        let (c0, edges) = (self.inside, &self.edges);
         let (c1, c2, c4) = (c0 ^ edges[8], c0 ^ edges[4], c0 ^ edges[0]);
         let (c3, c5, c6) = (c2 ^ edges[9], c4 ^ edges[10], c4 ^ edges[6]);
         let corners = [c0, c1, c2, c3, c4, c5, c6, c6 ^ edges[11]];
-        Cells { brick, plus, edges, corners }
+        Cells { edges: self, corners }
     }
 
     /// The cells with corners of both signs.
@@ -69,28 +81,36 @@ impl<'a> Cells<'a> {
         ];
         diagonals.iter().fold(ambiguous, |a, (at, others)| a | (all(at) & none(others)))
     }
+}
+
+impl<'a> Cells<'a> {
+    /// Brick number `i` of the octree.
+    pub(crate) fn new(octree: &'a SignedOctree, i: usize) -> Self {
+        CellEdges::new(octree, i).with_corners()
+    }
+
+    /// The cells with corners of both signs.
+    pub(crate) fn mixed(&self) -> Plane {
+        self.edges.mixed()
+    }
 
     /// Calls `each` with every mixed cell and its corners that are inside.
     #[inline]
     pub(crate) fn for_mixed(&self, mut each: impl FnMut(Local, Mask)) {
         let mixed = self.mixed();
-        for x in 0..8 {
-            let mut word = mixed.0[x];
-            while word != 0 {
-                // Eight cells along z: their bits in eight planes are eight masks, transposed.
-                let row = word.trailing_zeros() & !7;
-                let bits = std::array::from_fn(|corner| (self.corners[corner].0[x] >> row) as u8);
-                let masks = transposed(u64::from_le_bytes(bits)).to_le_bytes();
-                for z in Bits(word >> row & 0xff) {
-                    each(Local::from_index(x as u32 * 64 + row + z), masks[z as usize]);
-                }
-                word &= !(0xff << row);
+        for (x, &word) in mixed.0.iter().enumerate() {
+            if word == 0 {
+                continue;
+            }
+            let masks = masks(self.corners.map(|corner| corner.0[x])).map(u64::to_le_bytes);
+            for b in Bits(word) {
+                each(Local::from_index(x as u32 * 64 + b), masks.as_flattened()[b as usize]);
             }
         }
     }
 
     pub(crate) fn brick(&self) -> &'a Brick {
-        self.brick
+        self.edges.brick
     }
 
     /// The corners of a cell that are inside.
@@ -100,6 +120,20 @@ impl<'a> Cells<'a> {
         let bit = 8 * y + z;
         self.corners.iter().enumerate().fold(0, |mask, (i, plane)| mask | ((plane.0[x as usize] >> bit & 1) as u8) << i)
     }
+}
+
+/// The masks of the 64 cells of a layer, eight along z in each word, from the layer's words in the planes of the eight corners.
+#[inline]
+fn masks(mut words: [u64; 8]) -> [u64; 8] {
+    // Byte y of word `corner` becomes byte `corner` of word y: blocks of 4, 2 and 1 are exchanged across the diagonal.
+    for (block, mask) in [(4, 0x0000_0000_ffff_ffff), (2, 0x0000_ffff_0000_ffff), (1, 0x00ff_00ff_00ff_00ff)] {
+        for i in (0..8).filter(|i| i & block == 0) {
+            let (low, high) = (words[i], words[i + block]);
+            words[i] = (low & mask) | (high & mask) << (8 * block);
+            words[i + block] = (low >> (8 * block) & mask) | (high & !mask);
+        }
+    }
+    words.map(transposed)
 }
 
 /// The transposed matrix of 8 x 8 bits, a row in each byte (Warren, Hacker's Delight, 7-3).
@@ -115,6 +149,9 @@ pub(crate) fn transposed(mut bits: u64) -> u64 {
 const SIDE: usize = 9;
 /// Positions of the table for one axis.
 const LAYER: usize = SIDE * SIDE * SIDE;
+/// The bits of a word with the least y, and those with the least z, which begin its rows.
+const LOW_Y: u64 = 0xff;
+const LOW_Z: u64 = 0x0101_0101_0101_0101;
 /// Entries before a position's for one step along each axis.
 const STEP: [usize; 3] = [SIDE * SIDE, SIDE, 1];
 
@@ -200,10 +237,8 @@ impl<T: Copy> EdgeTable<T> {
     /// Makes an entry for each crossing round the cells of a brick.
     #[inline]
     pub(crate) fn fill(&mut self, cells: &Cells<'_>, mut entry: impl FnMut(Crossing) -> T) {
-        const LOW_Y: u64 = 0xff;
-        const LOW_Z: u64 = 0x0101_0101_0101_0101;
-        let mut number = cells.brick.first;
-        for (axis, plane) in Axis::ALL.into_iter().zip(&cells.brick.crossed) {
+        let mut number = cells.edges.brick.first;
+        for (axis, plane) in Axis::ALL.into_iter().zip(&cells.edges.brick.crossed) {
             for (x, &word) in plane.0.iter().enumerate() {
                 let inside = cells.corners[0].0[x];
                 for b in Bits(word) {
@@ -214,7 +249,7 @@ impl<T: Copy> EdgeTable<T> {
                 }
             }
         }
-        let [px, py, pz, pxy, pxz, pyz] = cells.plus;
+        let [px, py, pz, pxy, pxz, pyz] = cells.edges.plus;
         for (brick, axes, start, select) in [
             (px, &[Axis::Y, Axis::Z][..], [8, 0, 0], !0),
             (py, &[Axis::X, Axis::Z], [0, 8, 0], LOW_Y),
@@ -253,15 +288,26 @@ impl<T: Copy> EdgeTable<T> {
         let mut before = brick.first + brick.crossed[..axis.index()].iter().map(Plane::count).sum::<u32>();
         for (x, &word) in words.iter().enumerate() {
             let inside = corner.0[if high_x == 1 { 7 } else { x }] >> last;
-            for b in Bits(word & select) {
-                let number = before + (word & ((1 << b) - 1)).count_ones();
+            let rows = row_ranks(word);
+            for (i, b) in Bits(word & select).enumerate() {
+                // All before it are selected, too, or it begins a row.
+                let number = before + if select == LOW_Z { u32::from(rows[(b >> 3) as usize]) } else { i as u32 };
                 let start = [start[0] + x as u32, start[1] + (b >> 3), start[2] + (b & 7)];
                 self.0[at + x * STEP[0] + usize::from(AT[b as usize])] =
                     entry(Crossing { axis, start, number, starts_inside: inside >> b & 1 == 1 });
             }
-            before += word.count_ones();
+            before += u32::from(rows[8]);
         }
     }
+}
+
+/// How many bits of a word are set before each of its eight rows, and in all. As fast without an instruction that counts bits.
+fn row_ranks(word: u64) -> [u8; 9] {
+    let mut counts = word - (word >> 1 & 0x5555_5555_5555_5555);
+    counts = (counts & 0x3333_3333_3333_3333) + (counts >> 2 & 0x3333_3333_3333_3333);
+    counts = (counts + (counts >> 4)) & 0x0f0f_0f0f_0f0f_0f0f;
+    let sums = counts.wrapping_mul(LOW_Z).to_le_bytes();
+    std::array::from_fn(|row| if row == 0 { 0 } else { sums[row - 1] })
 }
 
 #[cfg(test)]
@@ -270,6 +316,13 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn ranks_count_the_bits_before(word: u64) {
+            let ranks = row_ranks(word);
+            (0..8).for_each(|row| assert_eq!(u32::from(ranks[row]), (word & ((1 << (8 * row)) - 1)).count_ones()));
+            prop_assert_eq!(u32::from(ranks[8]), word.count_ones());
+        }
+
         #[test]
         fn transposing_swaps_rows_and_columns(bits: u64) {
             let transposed = transposed(bits);

@@ -10,7 +10,7 @@
 //!
 //! Cost: that of [`Regions`], and some population counts a brick to measure them; independent of the volume.
 
-use super::cells::Cells;
+use super::cells::CellEdges;
 use super::crossings::{Brick, Builder, Crossings, finest_element, owner};
 use super::regions::{REGION_BYTES, Regions};
 use super::signed::SignedOctree;
@@ -180,9 +180,14 @@ fn higher(crossings: &Crossings, brick: &Brick) -> [Result<usize, Option<Key>>; 
 /// The pairs of outside points of a brick's cells that no edge need join: all outside corners of a cell hang together. In cells that are
 /// not knotty, edges join them.
 fn diagonals(octree: &SignedOctree, i: usize, join: &mut dyn FnMut([[u32; 3]; 2])) {
-    let cells = Cells::new(octree, i);
+    let edges = CellEdges::new(octree, i);
+    let knotty = edges.knotty();
+    if knotty == Plane::EMPTY {
+        return;
+    }
+    let cells = edges.with_corners();
     let origin = octree.crossings().origin(cells.brick());
-    for cell in cells.knotty().iter() {
+    for cell in knotty.iter() {
         let (c, mask) = (cell.coords(), cells.mask(cell));
         let point = |k: u32| std::array::from_fn(|a| origin[a] + c[a] + (k >> (2 - a) & 1));
         let mut outside = (0..8).filter(|k| mask >> k & 1 == 0).map(point);

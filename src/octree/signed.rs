@@ -1,6 +1,6 @@
 //! Inside and outside at every lattice point: what repair, topology and contouring meet in.
 
-use super::cells::Cells;
+use super::cells::CellEdges;
 use super::crossings::{Brick, Builder, Crossings, Sample, finest_element, lattice_point, position, toward};
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
@@ -202,7 +202,7 @@ impl SignedOctree {
     /// # Panics
     /// When there is no brick `i`.
     pub fn mixed_cells(&self, i: usize) -> Plane {
-        Cells::new(self, i).mixed()
+        CellEdges::new(self, i).mixed()
     }
 
     /// Whether lattice point `at` (in cells, 0 ..= 2^depth) is inside. Cost: a hash probe a brick along x until one is found.

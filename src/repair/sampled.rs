@@ -15,6 +15,7 @@ use crate::geom::normal::NormalCode;
 use crate::grid::brick::Plane;
 use crate::grid::{Axis, Key};
 use crate::octree::SignedOctree;
+use crate::octree::cells::transposed;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::signed::GIVEN_BYTES;
 use crate::progress::{Progress, Stage, check};
@@ -200,15 +201,6 @@ fn byte(words: &[u64], x: usize) -> u64 {
     bits & 0xff
 }
 
-/// The transpose of 8 x 8 bits, a byte a row: blocks of 4, 2 and 1 are exchanged across the diagonal.
-fn transposed(mut bits: u64) -> u64 {
-    for (shift, mask) in [(28, 0x0000_0000_f0f0_f0f0), (14, 0x0000_cccc_0000_cccc), (7, 0x00aa_00aa_00aa_00aa)] {
-        let swapped = (bits ^ bits >> shift) & mask;
-        bits ^= swapped ^ swapped << shift;
-    }
-    bits
-}
-
 /// A volume, asked for crossings.
 struct Field<'a, V> {
     volume: &'a V,
@@ -276,13 +268,6 @@ mod tests {
                 // Sample (0, 0, 0) is where it should be.
                 prop_assert_eq!(solid.frame.to_model(DVec3::splat(MARGIN as f64)), DVec3::splat(-1.0));
             }
-        }
-    }
-
-    #[test]
-    fn bits_are_transposed() {
-        for (row, column) in (0..64).map(|i| (i / 8, i % 8)) {
-            assert_eq!(transposed(1 << (8 * row + column)), 1 << (8 * column + row));
         }
     }
 
