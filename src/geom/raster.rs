@@ -152,6 +152,7 @@ impl Projection {
             return;
         }
         let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.half_plane(i, j, columns.0, rows.0));
+        let steps = edges.each_ref().map(|e| e.du);
         // Many small triangles pass between the lines: the rest is worked out at the first hit.
         let mut plane = None;
         let mut look = ROWS;
@@ -162,11 +163,13 @@ impl Projection {
                     return;
                 }
             }
-            let (mut first, mut end) = (0, columns.1 - columns.0);
-            for e in &edges {
-                let here = e.start + row * e.dv;
-                narrow(here, e.du, &mut first, &mut end);
-            }
+            let starts = edges.each_ref().map(|e| e.start + row * e.dv);
+            let (first, end) = match columns.1 - columns.0 {
+                width @ ..=2 => narrow_few::<2>(starts, steps, width),
+                width @ ..=4 => narrow_few::<4>(starts, steps, width),
+                width @ ..=8 => narrow_few::<8>(starts, steps, width),
+                width => narrow_many(starts, steps, width),
+            };
             if first >= end {
                 continue;
             }
@@ -230,35 +233,37 @@ impl Projection {
     }
 }
 
-/// Rows with at most so many columns are narrowed by stepping: cheaper than a division.
-const STEPPED_COLUMNS: i64 = 4;
-
-/// Cuts `first..end` down to the columns with `start + column * du >= 0`.
+/// The columns of a row of at most `N` that are inside of three half planes, `starts` in the first column and `steps` more in each next: the
+/// first, and the one after the last. Every column is looked at, without a branch.
 #[inline]
-fn narrow(start: i64, du: i64, first: &mut i64, end: &mut i64) {
-    let inside = |column: i64| start + column * du >= 0;
-    let stepped = *end - *first <= STEPPED_COLUMNS;
-    if du > 0 {
-        if !inside(*first) {
-            if stepped {
-                while *first < *end && !inside(*first) {
-                    *first += 1;
-                }
-            } else {
-                *first = (-start + du - 1) / du;
+fn narrow_few<const N: usize>(mut starts: [i64; 3], steps: [i64; 3], width: i64) -> (i64, i64) {
+    let mut outside = !0u32 << width;
+    for column in 0..N {
+        // The sign of all three at once.
+        let [a, b, c] = starts;
+        outside |= u32::from(a | b | c < 0) << column;
+        starts = [a + steps[0], b + steps[1], c + steps[2]];
+    }
+    // A triangle is convex: those inside are in a row.
+    let inside = !outside;
+    (i64::from(inside.trailing_zeros()), i64::from(u32::BITS - inside.leading_zeros()))
+}
+
+/// The same for rows of any length, by division.
+#[inline]
+fn narrow_many(starts: [i64; 3], steps: [i64; 3], width: i64) -> (i64, i64) {
+    let (mut first, mut end) = (0, width);
+    for (start, du) in starts.into_iter().zip(steps) {
+        let inside = |column: i64| start + column * du >= 0;
+        if du > 0 {
+            if !inside(first) {
+                first = (-start + du - 1) / du;
             }
-        }
-    } else if !inside(*end - 1) {
-        if start < 0 {
-            *end = *first;
-        } else if stepped {
-            while *first < *end && !inside(*end - 1) {
-                *end -= 1;
-            }
-        } else {
-            *end = start / -du + 1;
+        } else if !inside(end - 1) {
+            end = if start < 0 { first } else { start / -du + 1 };
         }
     }
+    (first, end)
 }
 
 /// Depth along the axis as a linear function of column and row, in 2^-36 of a cell.

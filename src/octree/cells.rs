@@ -67,19 +67,27 @@ impl<'a> CellEdges<'a> {
     /// Those of the mixed cells that may have several sheets, or one that is not a simple disc: cells with an ambiguous face (all four
     /// edges crossed), or whose only corners of one sign are opposite to each other. All others have one sheet and one vertex.
     pub(crate) fn knotty(&self) -> Plane {
-        let e = &self.edges;
-        let all = |list: &[usize]| list.iter().fold(Plane::FULL, |a, &i| a & e[i]);
-        let none = |list: &[usize]| !list.iter().fold(Plane::EMPTY, |a, &i| a | e[i]);
-        let faces = [[4, 8, 5, 9], [6, 10, 7, 11], [0, 8, 1, 10], [2, 9, 3, 11], [0, 4, 2, 6], [1, 5, 3, 7]];
-        let ambiguous = faces.iter().fold(Plane::EMPTY, |a, face| a | all(face));
-        // The edges at two opposite corners, and the others.
-        let diagonals = [
-            ([0, 4, 8, 3, 7, 11], [1, 2, 5, 6, 9, 10]),
-            ([1, 5, 8, 2, 6, 11], [0, 3, 4, 7, 9, 10]),
-            ([2, 4, 9, 1, 7, 10], [0, 3, 5, 6, 8, 11]),
-            ([3, 5, 9, 0, 6, 10], [1, 2, 4, 7, 8, 11]),
-        ];
-        diagonals.iter().fold(ambiguous, |a, (at, others)| a | (all(at) & none(others)))
+        Plane(std::array::from_fn(|x| {
+            let e: [u64; 12] = std::array::from_fn(|i| self.edges[i].0[x]);
+            let both = |[a, b]: [usize; 2]| e[a] & e[b];
+            // Two edges of a face that are parallel, and the other two.
+            let faces = [
+                ([0, 1], [8, 10]),
+                ([2, 3], [9, 11]),
+                ([0, 2], [4, 6]),
+                ([1, 3], [5, 7]),
+                ([4, 5], [8, 9]),
+                ([6, 7], [10, 11]),
+            ];
+            let ambiguous = faces.into_iter().fold(0, |any, (two, others)| any | both(two) & both(others));
+            // Of the edges along an axis, two that are opposite in the cell, and the other two. All edges at two opposite corners are a pair an
+            // axis.
+            let only = |[a, b]: [usize; 2], [c, d]: [usize; 2]| e[a] & e[b] & !(e[c] | e[d]);
+            let [x0, x1] = [only([0, 3], [1, 2]), only([1, 2], [0, 3])];
+            let [y0, y1] = [only([4, 7], [5, 6]), only([5, 6], [4, 7])];
+            let [z0, z1] = [only([8, 11], [9, 10]), only([9, 10], [8, 11])];
+            ambiguous | x0 & y0 & z0 | x1 & y1 & z0 | x1 & y0 & z1 | x0 & y1 & z1
+        }))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::cells::CellEdges;
 use super::crossings::{Brick, Builder, Crossings, Sample, finest_element, lattice_point, position, toward};
-use crate::grid::brick::{Local, Plane};
+use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::{Axis, Extent, Key};
 use crate::parallel::{in_order, pieces};
 use crate::progress::Silent;
@@ -256,11 +256,17 @@ impl SignedOctree {
         let from = f64::from(self.crossings.origin(brick)[a]);
         let first = (brick.first + brick.crossed[..a].iter().map(Plane::count).sum::<u32>()) as usize;
         let offsets = self.crossings.offsets().range(first..first + brick.crossed[a].count() as usize);
-        let ends = brick.crossed[a].iter().zip(offsets).map(|(p, &offset)| {
-            let w = from + f64::from(p.coords()[a]) + position(offset);
-            if inside.get(p) { w } else { -w }
-        });
-        ends.sum()
+        let starts: [f64; 8] = std::array::from_fn(|i| from + i as f64);
+        let mut offsets = offsets.into_iter();
+        let mut sum = 0.0;
+        for (x, (&word, &inside)) in brick.crossed[a].0.iter().zip(&inside.0).enumerate() {
+            for (b, &offset) in Bits(word).zip(&mut offsets) {
+                let along = [x, b as usize >> 3, b as usize & 7][a];
+                let w = starts[along % 8] + position(offset);
+                sum += if inside >> b & 1 == 1 { w } else { -w };
+            }
+        }
+        sum
     }
 
     /// Bytes held.
