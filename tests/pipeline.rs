@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use zmend::progress::Silent;
-use zmend::{Inside, Mesh, Options, RepairReport, Repaired, Solid, Surface, io, repair, solidify};
+use zmend::{Faces, Inside, Mesh, Options, RepairReport, Repaired, Solid, Surface, io, repair, solidify};
 
 /// What came of one file.
 #[derive(Default)]
@@ -127,6 +127,17 @@ fn every_mesh_is_repaired() {
 #[test]
 fn every_mesh_is_repaired_by_every_rule() {
     sweep_all(&[5], &[Inside::Parity, Inside::Winding, Inside::Hull]);
+}
+
+/// Seen from outside through its skin, this model has two solid points at depth 9, each with a surface of a quarter of a cell. Vertices of
+/// all eight cells round such a point went where their planes meet, past it and each other, and the volume came out negative.
+#[test]
+fn tips_smaller_than_a_cell_are_not_turned_inside_out() {
+    let Some(data) = data() else { return };
+    let mesh = io::read(data.join("cgal/pig.stl")).expect("a mesh");
+    let options = Options { inside: Inside::Hull, ..common::options(9, Surface::DualContouring, Faces::Auto) };
+    let topology = check_repaired(&repair(mesh, &options).expect("repairable")).expect("right side out");
+    assert_eq!(topology, Topology::new(2, 0), "two tips");
 }
 
 fn sweep_all(depths: &[u32], rules: &[Inside]) {
