@@ -83,18 +83,25 @@ impl Near {
     /// Calls with every place in the cube of a point or in one beside it, and maybe others.
     pub(super) fn each(&self, p: DVec3, mut visit: impl FnMut(u32)) {
         let cube = (p / self.size).floor().as_i64vec3();
-        for i in 0..27 {
-            let shift = I64Vec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-            self.cubes.get(&(cube + shift)).into_iter().flatten().for_each(|&j| visit(j));
-        }
+        neighbours(cube).for_each(|at| self.cubes.get(&at).into_iter().flatten().for_each(|&j| visit(j)));
     }
 
-    /// Points of rims in cubes about as large as the edges there: a handful each.
+    /// Points of rims in cubes about as large as the edges there: a handful each. Half of the edges are longer, so that a few far ones do not
+    /// bring all others into one cube.
     pub(super) fn of_rim(topology: &Topology<'_>, sides: &[u32], points: &[u32], tolerance: f64) -> Self {
         let at = |v: u32| topology.mesh().points[v as usize];
         let lengths = sides.iter().map(|&side| topology.ends(side).map(at)).map(|[a, b]| a.distance(b));
-        let size = (lengths.sum::<f64>() / sides.len().max(1) as f64).max(tolerance);
-        Near::new(points.iter().map(|&v| (v, at(v))), if size.is_finite() { size } else { 0.0 })
+        let mut lengths: Vec<f64> = lengths.filter(|length| length.is_finite()).collect();
+        let middle = lengths.len() / 2;
+        let median = lengths.get(middle).is_some().then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1);
+        Near::new(points.iter().map(|&v| (v, at(v))), median.unwrap_or(0.0).max(tolerance))
+    }
+
+    /// How many places [`each`](Self::each) would call with in all, if it were asked for every place. O(places).
+    pub(super) fn pairs(&self) -> u64 {
+        let around =
+            |cube: &I64Vec3| neighbours(*cube).map(|at| self.cubes.get(&at).map_or(0, Vec::len) as u64).sum::<u64>();
+        self.cubes.iter().map(|(cube, places)| places.len() as u64 * around(cube)).sum()
     }
 
     /// Calls with every place within the size of a cube of a straight line, some of them several times, and maybe others.
@@ -108,6 +115,11 @@ impl Near {
             all.into_iter().for_each(visit);
         }
     }
+}
+
+/// A cube and those around it.
+fn neighbours(cube: I64Vec3) -> impl Iterator<Item = I64Vec3> {
+    (0..27).map(move |i| cube + I64Vec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1))
 }
 
 #[cfg(test)]

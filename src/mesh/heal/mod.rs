@@ -25,7 +25,7 @@
 //!
 //! # Cost
 //!
-//! Each count takes some 40 ns a corner, self-intersections (if they are counted) 0.5 µs a triangle. Steps that find nothing cost
+//! Welding and stitching leave a mesh alone where points crowd within the tolerance ([`MOST_PAIRS`]). Each count takes some 40 ns a corner, self-intersections (if they are counted) 0.5 µs a triangle. Steps that find nothing cost
 //! a pass over the mesh or its rims. Memory: about 60 bytes a triangle beside the mesh and one copy of it.
 
 mod clean;
@@ -39,6 +39,17 @@ mod weld;
 use super::{Mesh, Topology};
 use crate::error::{Error, Result};
 use crate::progress::{Progress, Stage, check};
+
+/// Pairs of points that welding and stitching look at for each point of a rim, and [`SOME_PAIRS`] more in all; then they leave the mesh as it
+/// is. Usual are some ten. Where a tolerance is wide beside the model, as a millionth of the diagonal is if something lies far off, all points
+/// are near each other, and nothing is to be welded.
+const MOST_PAIRS: u64 = 1 << 10;
+const SOME_PAIRS: u64 = 1 << 22;
+
+/// Whether so many pairs are too many for a rim of so many points.
+fn is_crowded(pairs: u64, points: usize) -> bool {
+    pairs > SOME_PAIRS + MOST_PAIRS * points as u64
+}
 
 /// Settings of [`Mesh::heal`].
 #[derive(Debug, Clone, Copy, PartialEq)]

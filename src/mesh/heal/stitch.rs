@@ -4,7 +4,7 @@
 //! edge is then as many pieces as the edges on the other side of the crack, and shares them. An edge is only cut where at least half of
 //! its pieces find a partner, itself cut or not, so that cutting never leaves more rim than there was.
 
-use super::{Setting, rebuilt};
+use super::{Setting, is_crowded, rebuilt};
 use crate::mesh::gaps::{Near, place_on};
 use crate::mesh::{EdgeKey, Mesh, Topology, triangulate};
 use ahash::RandomState;
@@ -21,11 +21,16 @@ pub(super) fn stitch(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
     let at = |v: u32| mesh.points[v as usize];
     let near = Near::of_rim(&topology, &sides, &rim, setting.tolerance);
     let mut cuts: Vec<(u32, Vec<u32>)> = Vec::new();
+    let mut pairs = 0;
     for &side in &sides {
+        if is_crowded(pairs, rim.len()) {
+            return (mesh.clone(), 0);
+        }
         let [a, b] = topology.ends(side);
         let face = mesh.faces.get(topology.face(side) as usize);
         let mut on: Vec<(f64, u32)> = Vec::new();
         near.along(at(a), at(b), |v| {
+            pairs += 1;
             if let Some(t) = place_on(at(a), at(b), at(v), setting.tolerance)
                 && !face.contains(&v)
                 && !on.iter().any(|&(_, known)| known == v)

@@ -152,3 +152,24 @@ proptest! {
         heal(&mesh(9, &faces));
     }
 }
+
+/// A model beside which something lies a thousand million times as far off as it is large: the tolerance, a part of the diagonal, is wider than the model, and
+/// each point was compared with each other one.
+#[test]
+fn crowds_are_left_alone_and_soon() {
+    let mut crowd = soup(&sample::build("torus", 4).unwrap());
+    let first = crowd.points.len() as u32;
+    crowd.points.extend([1e9, 2e9, 3e9].map(|c| DVec3::new(c, c * c / 1e9, 1.0)));
+    crowd.faces.push(&[first, first + 1, first + 2]);
+    let begun = std::time::Instant::now();
+    let setting = Setting { tolerance: 1e3, ..setting() };
+    for step in [weld::weld, stitch::stitch] {
+        let (same, count) = step(&crowd, &setting);
+        assert_eq!((same == crowd, count), (true, 0));
+    }
+    // 369,000 points: all pairs would be some minutes.
+    assert!(begun.elapsed() < std::time::Duration::from_secs(20), "{:?}", begun.elapsed());
+    // With few such faces and a tolerance of the right size everything is found.
+    let sound = Setting { tolerance: 1e-5, ..setting };
+    assert_eq!(weld::weld(&crowd, &sound).0.report().components, 2);
+}

@@ -5,7 +5,7 @@
 //! lie closer than the tolerance by nature there. Of each cluster the point stays that is closest to its middle.
 
 use super::clean::push_mapped;
-use super::{Setting, rebuilt};
+use super::{Setting, is_crowded, rebuilt};
 use crate::mesh::gaps::Near;
 use crate::mesh::{Mesh, Topology};
 use crate::sets::Sets;
@@ -21,6 +21,9 @@ pub(super) fn weld(mesh: &Mesh, setting: &Setting) -> (Mesh, u64) {
     let at = |i: u32| mesh.points[rim[i as usize] as usize];
     let sets = Sets::new(rim.len());
     let near = Near::new((0..rim.len() as u32).map(|i| (i, at(i))), setting.tolerance);
+    if is_crowded(near.pairs(), rim.len()) {
+        return (mesh.clone(), 0);
+    }
     for i in 0..rim.len() as u32 {
         near.each(at(i), |j| {
             if j < i && at(i).distance(at(j)) <= setting.tolerance {
