@@ -154,8 +154,8 @@ fn triangles_of(octree: &SignedOctree, numbers: &mut EdgeTable<u32>, range: Rang
         let cells = Cells::new(octree, i);
         numbers.fill(&cells, |crossing| crossing.number);
         // Room for a cell is a slice of known length, and six corners are written without asking how many there are.
-        let room = made + MOST * cells.mixed().count() as usize;
-        corners.resize(room.max(corners.len()), 0);
+        let end = made + MOST * cells.mixed().count() as usize;
+        corners.resize(end.max(corners.len()), 0);
         cells.for_mixed(|cell, mask| {
             let Places { count, at } = &places[usize::from(mask)];
             let point = numbers.around(cell);
