@@ -10,7 +10,7 @@
 use super::PIECE;
 use crate::error::Result;
 use crate::geom::Frame;
-use crate::grid::brick::{Bits, Local, Plane};
+use crate::grid::brick::{Bits, Plane};
 use crate::grid::cases::CASES;
 use crate::mesh::{MeshSink, MeshSizes};
 use crate::octree::SignedOctree;
@@ -72,16 +72,12 @@ pub fn marching_cubes(
 fn count_triangles(octree: &SignedOctree) -> u64 {
     let of_brick = |i: usize| {
         let edges = CellEdges::new(octree, i);
-        let (mixed, knotty) = (i64::from(edges.mixed().count()), edges.knotty());
-        if knotty == Plane::EMPTY {
-            return -2 * mixed;
-        }
-        let cells = edges.with_corners();
-        let correction = |cell: Local| {
-            let case = &CASES[usize::from(cells.mask(cell))];
-            case.triangles.len() as i64 + 2 - case.cycles.iter().map(Vec::len).sum::<usize>() as i64
-        };
-        knotty.iter().map(correction).sum::<i64>() - 2 * mixed
+        let mut correction = -2 * i64::from(edges.mixed().count());
+        edges.for_knotty(|_, mask| {
+            let case = &CASES[usize::from(mask)];
+            correction += case.triangles.len() as i64 + 2 - case.cycles.iter().map(Vec::len).sum::<usize>() as i64;
+        });
+        correction
     };
     let corrections: i64 = (0..octree.crossings().bricks().len()).into_par_iter().map(of_brick).sum();
     (4 * octree.crossings().len() as i64 + corrections) as u64

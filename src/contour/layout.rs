@@ -56,13 +56,13 @@ impl<'a> Layout<'a> {
             .into_par_iter()
             .map(|i| {
                 let edges = CellEdges::new(octree, i);
-                let (mixed, knotty) = (edges.mixed(), edges.knotty());
-                if knotty == Plane::EMPTY {
-                    return (mixed, Vec::new());
-                }
-                let cells = edges.with_corners();
-                let knots = knotty.iter().map(|cell| Knot { cell, mask: cells.mask(cell) });
-                (mixed, knots.filter(|k| CASES[usize::from(k.mask)].sheets.vertices > 1).collect())
+                let (mixed, mut knots) = (edges.mixed(), Vec::new());
+                edges.for_knotty(|cell, mask| {
+                    if CASES[usize::from(mask)].sheets.vertices > 1 {
+                        knots.push(Knot { cell, mask });
+                    }
+                });
+                (mixed, knots)
             })
             .collect();
         let mut layout =

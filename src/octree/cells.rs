@@ -49,8 +49,18 @@ impl<'a> CellEdges<'a> {
         CellEdges { brick, plus, edges, inside: octree.inside()[i] }
     }
 
+    /// Calls `each` with every [knotty](Self::knotty) cell and its corners that are inside. Most bricks have none, and then no corners are asked
+    /// for.
+    pub(crate) fn for_knotty(self, mut each: impl FnMut(Local, Mask)) {
+        let knotty = self.knotty();
+        if knotty != Plane::EMPTY {
+            let cells = self.with_corners();
+            knotty.iter().for_each(|cell| each(cell, cells.mask(cell)));
+        }
+    }
+
     /// The corners, too.
-    pub(crate) fn with_corners(self) -> Cells<'a> {
+    fn with_corners(self) -> Cells<'a> {
         // The sign changes along a crossed edge: corners follow from the least one.
         let (c0, edges) = (self.inside, &self.edges);
         let (c1, c2, c4) = (c0 ^ edges[8], c0 ^ edges[4], c0 ^ edges[0]);
@@ -66,7 +76,7 @@ impl<'a> CellEdges<'a> {
 
     /// Those of the mixed cells that may have several sheets, or one that is not a simple disc: cells with an ambiguous face (all four
     /// edges crossed), or whose only corners of one sign are opposite to each other. All others have one sheet and one vertex.
-    pub(crate) fn knotty(&self) -> Plane {
+    fn knotty(&self) -> Plane {
         Plane(std::array::from_fn(|x| {
             let e: [u64; 12] = std::array::from_fn(|i| self.edges[i].0[x]);
             let both = |[a, b]: [usize; 2]| e[a] & e[b];

@@ -180,20 +180,15 @@ fn higher(crossings: &Crossings, brick: &Brick) -> [Result<usize, Option<Key>>; 
 /// The pairs of outside points of a brick's cells that no edge need join: all outside corners of a cell hang together. In cells that are
 /// not knotty, edges join them.
 fn diagonals(octree: &SignedOctree, i: usize, join: &mut dyn FnMut([[u32; 3]; 2])) {
-    let edges = CellEdges::new(octree, i);
-    let knotty = edges.knotty();
-    if knotty == Plane::EMPTY {
-        return;
-    }
-    let cells = edges.with_corners();
-    let origin = octree.crossings().origin(cells.brick());
-    for cell in knotty.iter() {
-        let (c, mask) = (cell.coords(), cells.mask(cell));
+    let crossings = octree.crossings();
+    let origin = crossings.origin(&crossings.bricks()[i]);
+    CellEdges::new(octree, i).for_knotty(|cell, mask| {
+        let c = cell.coords();
         let point = |k: u32| std::array::from_fn(|a| origin[a] + c[a] + (k >> (2 - a) & 1));
         let mut outside = (0..8).filter(|k| mask >> k & 1 == 0).map(point);
         let first = outside.next().expect("a knotty cell is mixed");
         outside.for_each(|other| join([first, other]));
-    }
+    });
 }
 
 /// The crossings that `kept` names for each brick: none that is not there.

@@ -55,7 +55,8 @@ fn is_crowded(pairs: u64, points: usize) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HealOptions {
     /// Points of rims that are not farther apart are welded, and stitched to edges that are not farther away. In parts of the diagonal
-    /// of the box around the mesh, unless `is_absolute`.
+    /// of the box around the mesh, unless `is_absolute`. Where it is so wide that hundreds of points lie within it of each other, nothing is
+    /// welded or stitched.
     pub tolerance: f64,
     /// Whether the tolerance is in model units.
     pub is_absolute: bool,

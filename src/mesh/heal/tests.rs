@@ -153,8 +153,7 @@ proptest! {
     }
 }
 
-/// A model beside which something lies a thousand million times as far off as it is large: the tolerance, a part of the diagonal, is wider than the model, and
-/// each point was compared with each other one.
+/// Something lies so far off that the tolerance, a part of the diagonal, is wider than the model: each point was compared with each other one.
 #[test]
 fn crowds_are_left_alone_and_soon() {
     let mut crowd = soup(&sample::build("torus", 4).unwrap());
