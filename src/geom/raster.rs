@@ -48,6 +48,9 @@ pub trait Hits {
 /// Rows of a triangle between two looks at [`Hits::is_enough`]: some milliseconds in the finest grid, and more than a small triangle has.
 const ROWS: i64 = 16;
 
+/// Rows of a triangle of few columns that are looked at together, and the most of such columns.
+const BAND: i64 = 8;
+
 /// Extra bits of the fixed-point depth below 1/65536 of a cell.
 const GUARD_BITS: u32 = 20;
 
@@ -135,74 +138,125 @@ impl Projection {
         Projection { corners, normal, columns: ranges[U], rows: ranges[V], ccw, shift, turned }
     }
 
-    /// The side of the edge from corner `i` to corner `j` on which the triangle lies, relative to line (`column`, `row`).
+    /// The side of the edge from corner `p` to corner `q` on which the triangle lies, from the first column and row on.
     #[inline]
-    fn half_plane(&self, i: usize, j: usize, column: i64, row: i64) -> HalfPlane {
-        let (p, q) = if self.ccw { (self.corners[i], self.corners[j]) } else { (self.corners[j], self.corners[i]) };
+    fn half_plane(&self, p: [i64; 3], q: [i64; 3]) -> HalfPlane {
+        let (p, q) = if self.ccw { (p, q) } else { (q, p) };
         let (a, b) = (p[1] - q[1], q[0] - p[0]);
-        let value = a * ((column << self.shift) - p[0]) + b * ((row << self.shift) - p[1]);
+        let value = a * ((self.columns.0 << self.shift) - p[0]) + b * ((self.rows.0 << self.shift) - p[1]);
         let zero_is_inside = a > 0 || (a == 0 && b > 0);
         HalfPlane { start: value - i64::from(!zero_is_inside), du: a << self.shift, dv: b << self.shift }
     }
 
     #[inline]
     fn scan(&self, axis: Axis, hits: &mut impl Hits) {
-        let (columns, rows) = (self.columns, self.rows);
         if self.normal[2] == 0 {
             return;
         }
-        let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.half_plane(i, j, columns.0, rows.0));
-        let steps = edges.each_ref().map(|e| e.du);
+        match self.columns.1 - self.columns.0 {
+            ..=2 => self.scan_narrow::<2>(axis, hits),
+            ..=4 => self.scan_narrow::<4>(axis, hits),
+            ..=6 => self.scan_narrow::<6>(axis, hits),
+            ..=BAND => self.scan_narrow::<{ BAND as usize }>(axis, hits),
+            _ => self.scan_wide(axis, hits),
+        }
+    }
+
+    /// The half planes of the three sides.
+    #[inline]
+    fn sides(&self) -> [HalfPlane; 3] {
+        let [a, b, c] = self.corners;
+        [self.half_plane(a, b), self.half_plane(b, c), self.half_plane(c, a)]
+    }
+
+    /// At most `N` columns: the lines of a band of rows are told as the bits of one word, and hits are drawn from that, without a branch
+    /// that depends on where a row begins and ends.
+    #[inline]
+    fn scan_narrow<const N: usize>(&self, axis: Axis, hits: &mut impl Hits) {
+        let sides = self.sides();
+        let steps = sides.each_ref().map(|side| side.du);
+        let mut starts = sides.each_ref().map(|side| side.start);
+        let wanted = (1u64 << (self.columns.1 - self.columns.0)) - 1;
+        let count = self.rows.1 - self.rows.0;
         // Many small triangles pass between the lines: the rest is worked out at the first hit.
         let mut plane = None;
-        let mut look = ROWS;
-        for row in 0..rows.1 - rows.0 {
-            if row == look {
-                look += ROWS;
-                if hits.is_enough() {
-                    return;
+        let mut band = 0;
+        while band < count {
+            if band != 0 && hits.is_enough() {
+                return;
+            }
+            let mut inside = 0;
+            for row in 0..BAND.min(count - band) {
+                inside |= (inside_of::<N>(starts, steps) & wanted) << (row * BAND);
+                starts = std::array::from_fn(|i| starts[i] + sides[i].dv);
+            }
+            if inside != 0 {
+                let plane = plane.get_or_insert_with(|| self.plane(axis, hits));
+                while inside != 0 {
+                    let line = i64::from(inside.trailing_zeros());
+                    inside &= inside - 1;
+                    let (column, row) = (line % BAND, band + line / BAND);
+                    self.hit(axis, column, row, plane.depth.at(column, row), plane, hits);
                 }
             }
-            let starts = edges.each_ref().map(|e| e.start + row * e.dv);
-            let (first, end) = match columns.1 - columns.0 {
-                width @ ..=2 => narrow_few::<2>(starts, steps, width),
-                width @ ..=4 => narrow_few::<4>(starts, steps, width),
-                width @ ..=8 => narrow_few::<8>(starts, steps, width),
-                width => narrow_many(starts, steps, width),
-            };
-            if first >= end {
-                continue;
+            band += BAND;
+        }
+    }
+
+    /// Any number of columns.
+    #[inline]
+    fn scan_wide(&self, axis: Axis, hits: &mut impl Hits) {
+        let sides = self.sides();
+        let steps = sides.each_ref().map(|side| side.du);
+        let width = self.columns.1 - self.columns.0;
+        let mut plane = None;
+        for row in 0..self.rows.1 - self.rows.0 {
+            if row % ROWS == ROWS - 1 && hits.is_enough() {
+                return;
             }
-            let (depth, above) = plane.get_or_insert_with(|| {
-                let [u, v, w] = self.normal.map(|c| (if self.turned { -c } else { c }) as f64);
-                let normal = match axis {
-                    Axis::X => [w, u, v],
-                    Axis::Y => [u, w, v],
-                    Axis::Z => [u, v, w],
-                };
-                hits.plane(axis, normal);
-                (Depth::new(self, columns, rows), self.tie_is_above(axis))
-            });
-            let mut fixed = depth.row(row).wrapping_add(first.wrapping_mul(depth.du));
-            for column in first..end {
-                let code = fixed >> GUARD_BITS;
-                fixed = fixed.wrapping_add(depth.du);
-                let (u, v) = (columns.0 + column, rows.0 + row);
-                let offset = code & 0xffff;
-                let (cell, offset) = if depth.reliable && offset.wrapping_sub(1) as u64 <= 65533 {
-                    (code >> 16, offset as u16)
-                } else {
-                    self.exact_depth(u, v, *above)
-                };
-                let (u, v, w) = (u as u32, v as u32, cell as u32);
-                let at = match axis {
-                    Axis::X => [w, u, v],
-                    Axis::Y => [u, w, v],
-                    Axis::Z => [u, v, w],
-                };
-                hits.hit(axis, at, offset);
+            let (first, end) = inside_of_row(sides.each_ref().map(|side| side.start + row * side.dv), steps, width);
+            if first < end {
+                let plane = plane.get_or_insert_with(|| self.plane(axis, hits));
+                let mut fixed = plane.depth.at(first, row);
+                for column in first..end {
+                    self.hit(axis, column, row, fixed, plane, hits);
+                    fixed = fixed.wrapping_add(plane.depth.du);
+                }
             }
         }
+    }
+
+    /// What hits along `axis` need, once there is one.
+    #[inline]
+    fn plane(&self, axis: Axis, hits: &mut impl Hits) -> Plane {
+        let [u, v, w] = self.normal.map(|c| (if self.turned { -c } else { c }) as f64);
+        let normal = match axis {
+            Axis::X => [w, u, v],
+            Axis::Y => [u, w, v],
+            Axis::Z => [u, v, w],
+        };
+        hits.plane(axis, normal);
+        Plane { depth: Depth::new(self, self.columns, self.rows), tie_is_above: self.tie_is_above(axis) }
+    }
+
+    /// Passes on the hit on line (`column`, `row`) of those that may pass, at depth `fixed`.
+    #[inline]
+    fn hit(&self, axis: Axis, column: i64, row: i64, fixed: i64, plane: &Plane, hits: &mut impl Hits) {
+        let code = fixed >> GUARD_BITS;
+        let (u, v) = (self.columns.0 + column, self.rows.0 + row);
+        let offset = code & 0xffff;
+        let (cell, offset) = if plane.depth.reliable && offset.wrapping_sub(1) as u64 <= 65533 {
+            (code >> 16, offset as u16)
+        } else {
+            self.exact_depth(u, v, plane.tie_is_above)
+        };
+        let (u, v, w) = (u as u32, v as u32, cell as u32);
+        let at = match axis {
+            Axis::X => [w, u, v],
+            Axis::Y => [u, w, v],
+            Axis::Z => [u, v, w],
+        };
+        hits.hit(axis, at, offset);
     }
 
     /// On which side of a moved lattice point a hit lies that is exactly on the unmoved one.
@@ -233,25 +287,23 @@ impl Projection {
     }
 }
 
-/// The columns of a row of at most `N` that are inside of three half planes, `starts` in the first column and `steps` more in each next: the
-/// first, and the one after the last. Every column is looked at, without a branch.
+/// The columns of a row that are inside of three half planes, as bits, of the first `N`: `starts` in the first column and `steps` more in
+/// each next.
 #[inline]
-fn narrow_few<const N: usize>(mut starts: [i64; 3], steps: [i64; 3], width: i64) -> (i64, i64) {
-    let mut outside = !0u32 << width;
+fn inside_of<const N: usize>(mut starts: [i64; 3], steps: [i64; 3]) -> u64 {
+    let mut inside = 0;
     for column in 0..N {
         // The sign of all three at once.
         let [a, b, c] = starts;
-        outside |= u32::from(a | b | c < 0) << column;
+        inside |= u64::from(a | b | c >= 0) << column;
         starts = [a + steps[0], b + steps[1], c + steps[2]];
     }
-    // A triangle is convex: those inside are in a row.
-    let inside = !outside;
-    (i64::from(inside.trailing_zeros()), i64::from(u32::BITS - inside.leading_zeros()))
+    inside
 }
 
-/// The same for rows of any length, by division.
+/// The columns of a row of any length that are inside, by division: the first, and the one after the last.
 #[inline]
-fn narrow_many(starts: [i64; 3], steps: [i64; 3], width: i64) -> (i64, i64) {
+fn inside_of_row(starts: [i64; 3], steps: [i64; 3], width: i64) -> (i64, i64) {
     let (mut first, mut end) = (0, width);
     for (start, du) in starts.into_iter().zip(steps) {
         let inside = |column: i64| start + column * du >= 0;
@@ -266,11 +318,18 @@ fn narrow_many(starts: [i64; 3], steps: [i64; 3], width: i64) -> (i64, i64) {
     (first, end)
 }
 
+/// The plane of a triangle, seen along an axis.
+struct Plane {
+    depth: Depth,
+    /// On which side of a moved lattice point a hit lies that is exactly on the unmoved one.
+    tie_is_above: bool,
+}
+
 /// Depth along the axis as a linear function of column and row, in 2^-36 of a cell.
 struct Depth {
-    start: f64,
-    dv: f64,
+    start: i64,
     du: i64,
+    dv: i64,
     /// Whether the error stays below 1/65536 of a cell.
     reliable: bool,
 }
@@ -290,17 +349,17 @@ impl Depth {
         let reach_u = slope_u.abs() * ((columns.1 - columns.0 + 1) << p.shift) as f64;
         let reach_v = slope_v.abs() * ((rows.1 - rows.0 + 1) << p.shift) as f64;
         // Rounding errors are below 8 ulp of the largest intermediate; 2^60 keeps the fixed point within i64, where
-        // 2^60 * 2^-50 = 2^10 is far below the 2^20 of 1/65536 of a cell. Adding `du` once a column adds at most half
-        // a unit each, 2^17 over the longest row.
+        // 2^60 * 2^-50 = 2^10 is far below the 2^20 of 1/65536 of a cell. What `du` and `dv` lack adds at most a unit a
+        // column and a row, 2^18 over the greatest triangle.
         let reliable = (reach_u + reach_v + w as f64) * unit < 2f64.powi(60);
         let start = (w as f64 + slope_u * du + slope_v * dv) * unit;
-        Depth { start, dv: slope_v * cell, du: (slope_u * cell) as i64, reliable }
+        Depth { start: start as i64, du: (slope_u * cell) as i64, dv: (slope_v * cell) as i64, reliable }
     }
 
-    /// Depth at the first column of a row.
+    /// Depth on a line, by its column and row.
     #[inline]
-    fn row(&self, row: i64) -> i64 {
-        (self.start + row as f64 * self.dv) as i64
+    fn at(&self, column: i64, row: i64) -> i64 {
+        self.start.wrapping_add(column.wrapping_mul(self.du)).wrapping_add(row.wrapping_mul(self.dv))
     }
 }
 

@@ -173,11 +173,9 @@ impl Bucket {
         chunks.map(|chunk| (chunk.capacity() * size_of::<Hit>()) as u64).sum()
     }
 
-    /// Moves all hits to the end of `hits`; every chunk is freed as soon as it is copied.
-    pub(super) fn drain_into(self, hits: &mut Vec<Hit>) {
-        for chunk in self.full.into_iter().chain([self.open]) {
-            hits.extend_from_slice(&chunk);
-        }
+    /// Its hits, as they lie in its chunks.
+    fn chunks(&self) -> impl Iterator<Item = &[Hit]> {
+        self.full.iter().chain([&self.open]).map(Vec::as_slice)
     }
 }
 
@@ -256,34 +254,43 @@ impl Hits for HitSorter<'_> {
     }
 }
 
-/// Sorts hits by edge, then by offset, normal and orientation. Returns whether some edge has several.
+/// The hits of some buckets, sorted by edge, then by offset, normal and orientation, to `hits`; what was there before is lost. Returns
+/// whether some edge has several.
 #[inline(never)]
-pub(super) fn sort_hits(hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
+pub(super) fn sort_hits(buckets: &[Bucket], hits: &mut Vec<Hit>, scratch: &mut Vec<Hit>) -> bool {
     const DIGIT: u32 = 10;
-    if hits.len() < 512 {
+    let count = buckets.iter().flat_map(Bucket::chunks).map(<[Hit]>::len).sum();
+    if count < 512 {
+        hits.clear();
+        buckets.iter().flat_map(Bucket::chunks).for_each(|chunk| hits.extend_from_slice(chunk));
         hits.sort_unstable();
         return hits.windows(2).any(|pair| pair[0].slot() == pair[1].slot());
     }
     // Two stable passes over the 20 bits of the slot; hits that share an edge are few and sorted afterwards.
-    scratch.resize(hits.len(), Hit(0));
     let digit = |h: Hit, shift: u32| (h.0 >> shift) as usize & ((1 << DIGIT) - 1);
     let mut next = [[0u32; 1 << DIGIT]; 2];
-    for &h in hits.iter() {
+    for &h in buckets.iter().flat_map(Bucket::chunks).flatten() {
         next[0][digit(h, 33)] += 1;
         next[1][digit(h, 33 + DIGIT)] += 1;
     }
-    for (shift, next) in [33, 33 + DIGIT].into_iter().zip(&mut next) {
+    for next in &mut next {
         let mut sum = 0;
         for n in next.iter_mut() {
             sum += std::mem::replace(n, sum);
         }
-        for &h in hits.iter() {
+    }
+    let [low, high] = &mut next;
+    let scatter = |from: &[Hit], shift: u32, next: &mut [u32; 1 << DIGIT], to: &mut [Hit]| {
+        for &h in from {
             let place = &mut next[digit(h, shift)];
-            scratch[*place as usize] = h;
+            to[*place as usize] = h;
             *place += 1;
         }
-        std::mem::swap(hits, scratch);
-    }
+    };
+    scratch.resize(count, Hit(0));
+    buckets.iter().flat_map(Bucket::chunks).for_each(|chunk| scatter(chunk, 33, low, scratch));
+    hits.resize(count, Hit(0));
+    scatter(scratch, 33 + DIGIT, high, hits);
     let mut repeated = false;
     let mut i = 1;
     while i < hits.len() {
@@ -344,7 +351,7 @@ mod tests {
         let (block, bucket) = sorter.into_buckets().pop().unwrap();
         assert_eq!(block, [1, 0, 2]);
         let mut hits = Vec::new();
-        bucket.drain_into(&mut hits);
+        sort_hits(&[bucket], &mut hits, &mut Vec::new());
         assert_eq!(brick_coords(hits[0].brick()), [5, 2, 7]);
         assert_eq!((hits[0].local(), hits[0].axis(), hits[0].offset()), (64 * 3 + 8 * 7 + 1, 1, 999));
         assert_eq!(hits[0].normal().decode(Axis::Y), glam::Vec3A::Y);
@@ -354,15 +361,23 @@ mod tests {
     #[test]
     fn radix_sort_sorts() {
         let mut state = 1u64;
-        let mut hits: Vec<_> = (0..5000)
-            .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                Hit((state >> 11) & !(0xfff << 41))
-            })
-            .collect();
-        let mut expected = hits.clone();
-        expected.sort_unstable();
-        sort_hits(&mut hits, &mut Vec::new());
-        assert_eq!(hits, expected);
+        let mut next = |_| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            Hit((state >> 11) & !(0xfff << 41))
+        };
+        // Few hits are sorted in another way than many.
+        for count in [0, 300, 5000] {
+            let mut expected: Vec<_> = (0..count).map(&mut next).collect();
+            let (first, last) = expected.split_at(count / 3);
+            let buckets = [first, last].map(|hits| {
+                let (full, open) = hits.split_at(hits.len() / 2);
+                Bucket { full: vec![full.to_vec()], open: open.to_vec() }
+            });
+            expected.sort_unstable();
+            let mut hits = vec![Hit(7); 1000];
+            let repeated = sort_hits(&buckets, &mut hits, &mut Vec::new());
+            assert_eq!(hits, expected);
+            assert_eq!(repeated, expected.windows(2).any(|pair| pair[0].slot() == pair[1].slot()));
+        }
     }
 }

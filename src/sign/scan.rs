@@ -332,10 +332,9 @@ fn resolve<const ORIENTED: bool>(
     let resolve = |(hits, spare): &mut (Vec<Hit>, Vec<Hit>), n: usize| {
         let block = blocks[n].lock().expect("locked once").take();
         let (block, buckets) = block.expect("each block is resolved once");
-        hits.clear();
         let freed = buckets.iter().map(Bucket::bytes).sum();
-        buckets.into_iter().for_each(|bucket| bucket.drain_into(hits));
-        let repeated = sort_hits(hits, spare);
+        let repeated = sort_hits(&buckets, hits, spare);
+        drop(buckets);
         Resolved { freed, ..resolve_block::<ORIENTED>(block, hits, repeated, depth, with_normals) }
     };
     let append = |block: Resolved| {
