@@ -87,7 +87,8 @@ fn count_triangles(octree: &SignedOctree) -> u64 {
 fn points(crossings: &Crossings, frame: &Frame, range: Range<usize>) -> Vec<DVec3> {
     let places = crossings.places(range.clone());
     let mut points = Vec::with_capacity(places.len());
-    let mut offsets = crossings.offsets().range(places).copied();
+    let offsets = crossings.offsets().slice(places);
+    let mut offsets = offsets.iter().copied();
     for brick in range.map(|i| &crossings.bricks()[i]) {
         // The brick's lattice planes in model space.
         let origin = DVec3::from(crossings.origin(brick).map(f64::from));

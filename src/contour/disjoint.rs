@@ -308,7 +308,7 @@ impl Disjoint<'_> {
             let mut plain = self.placed.layout.mixed(i);
             self.placed.layout.knots_of(i).iter().for_each(|knot| plain.toggle(knot.cell));
             let [first, end] = [i, i + 1].map(|i| self.placed.layout.first_of(i) as usize);
-            points.extend(plain.iter().zip(self.placed.positions.range(first..end)).map(|(cell, p)| {
+            points.extend(plain.iter().zip(&*self.placed.positions.slice(first..end)).map(|(cell, p)| {
                 let in_cell = DVec3::from(p.map(|c| (f64::from(c) + 0.5) * (1.0 / 65536.0)));
                 frame.to_model(origin + DVec3::from(cell.coords().map(f64::from)) + in_cell)
             }));
@@ -330,7 +330,8 @@ impl Disjoint<'_> {
     fn faces(&self, triangles: bool, table: &mut CellTable<Numbered>, range: Range<usize>) -> Faces {
         let crossings = self.placed.layout.octree.crossings();
         let places = crossings.places(range.clone());
-        let mut cuts = self.cut.by_crossing.range(places.clone());
+        let cuts = self.cut.by_crossing.slice(places.clone());
+        let mut cuts = cuts.iter();
         let mut faces = Faces::new(triangles, places.len());
         for i in range {
             table.fill(&self.placed.layout, i, |Seen { brick, first, mask, .. }| Numbered {
@@ -404,7 +405,7 @@ impl Disjoint<'_> {
         let i = crossings.find(key).expect("crossed edges belong to listed bricks");
         let brick = &crossings.bricks()[i];
         let place = brick.place(edge.axis(), Local::new(at[0], at[1], at[2]));
-        let before = self.cut.by_crossing.range(brick.first as usize..place).filter(|&cut| cut & POINT != 0).count();
+        let before = self.cut.by_crossing.slice(brick.first as usize..place).iter().filter(|&cut| cut & POINT != 0).count();
         self.first_on_edges(i) + before as u32
     }
 }

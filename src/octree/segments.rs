@@ -1,5 +1,6 @@
 //! A list that grows without moving what is in it.
 
+use std::borrow::Cow;
 use std::ops::{Index, IndexMut, Range};
 
 /// A vector in segments of `2^BITS` elements.
@@ -50,14 +51,23 @@ impl<T, const BITS: u32> Segments<T, BITS> {
         self.segments.iter().flatten()
     }
 
-    /// The elements at some places in order.
-    pub fn range(&self, range: Range<usize>) -> impl Iterator<Item = &T> + Clone {
+    /// The elements at some places in order; what is past the end is left out. Only where they lie in several segments they are copied.
+    pub fn slice(&self, range: Range<usize>) -> Cow<'_, [T]>
+    where
+        T: Clone,
+    {
         let (first, last) = (range.start >> BITS, range.end.div_ceil(Self::SIZE));
-        let segments = self.segments.get(first..last).unwrap_or_default().iter().enumerate();
-        segments.flat_map(move |(i, segment)| {
-            let start = (first + i) << BITS;
-            &segment[range.start.saturating_sub(start)..segment.len().min(range.end - start)]
-        })
+        let segments = self.segments.get(first..last.min(self.segments.len())).unwrap_or_default();
+        let part = |i: usize| {
+            let (segment, start) = (&segments[i], (first + i) << BITS);
+            let end = segment.len().min(range.end - start);
+            &segment[range.start.saturating_sub(start).min(end)..end]
+        };
+        match segments.len() {
+            0 => Cow::Borrowed(&[]),
+            1 => Cow::Borrowed(part(0)),
+            count => Cow::Owned((0..count).flat_map(part).cloned().collect()),
+        }
     }
 
     /// Gives back the room in the last segment that is not used.
@@ -158,18 +168,18 @@ mod tests {
         assert_eq!(list.len(), 1000);
         assert!(list.iter().eq(&plain));
         for (a, b) in [(0, 0), (0, 1000), (15, 17), (16, 32), (33, 900), (1000, 1000), (999, 1000)] {
-            assert!(list.range(a..b).eq(&plain[a..b]), "{a}..{b}");
+            assert_eq!(*list.slice(a..b), plain[a..b]);
         }
         list[77] = 5;
         assert_eq!((list[77], list[78]), (5, 78));
         assert!(list.allocated_bytes() >= 4000);
         let before = list.allocated_bytes();
         list.shrink_to_fit();
-        assert!(list.allocated_bytes() < before && list.iter().eq(list.range(0..1000)));
+        assert!(list.allocated_bytes() < before && list.iter().eq(&*list.slice(0..1000)));
         let (mut reader, mut part, mut at) = (list.clone().into_reader(), Vec::new(), 0);
         for count in [0, 1, 15, 16, 17, 300, 651, 5] {
             reader.read(count, &mut part);
-            assert!(list.range(at..1000.min(at + count)).eq(&part), "{at} {count}");
+            assert_eq!(*list.slice(at..at + count), part);
             at += part.len();
         }
         assert!(list.into_iter().skip(78).eq(plain[78..].iter().copied()));

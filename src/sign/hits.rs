@@ -187,8 +187,8 @@ pub(super) struct HitSorter<'a> {
     ledger: &'a Ledger<'a>,
     buckets: Vec<(BlockCoords, Bucket)>,
     by_block: HashMap<BlockCoords, usize, ahash::RandomState>,
-    /// The block of the last hit, and its bucket.
-    current: Option<(BlockCoords, usize)>,
+    /// The least point of the last hit's block, at first of none, and the block's bucket.
+    current: ([u32; 3], usize),
     /// Axis, normal and orientation of the triangle at work, in place.
     plane: u64,
     with_normals: bool,
@@ -200,7 +200,7 @@ impl<'a> HitSorter<'a> {
             ledger,
             buckets: Vec::new(),
             by_block: HashMap::with_hasher(ahash::RandomState::with_seeds(1, 2, 3, 4)),
-            current: None,
+            current: ([u32::MAX; 3], 0),
             plane: 0,
             with_normals,
         }
@@ -211,16 +211,20 @@ impl<'a> HitSorter<'a> {
     }
 
     #[cold]
-    fn turn_to(&mut self, block: BlockCoords) -> usize {
-        if !self.by_block.contains_key(&block) && !self.ledger.note(BUCKET) && !self.buckets.is_empty() {
+    fn turn_to(&mut self, at: [u32; 3]) -> usize {
+        let block = at.map(|c| c >> BLOCK_SHIFT);
+        let bucket = match self.by_block.get(&block) {
+            Some(&bucket) => bucket,
             // Any bucket will do for hits that are dropped.
-            return 0;
-        }
-        let bucket = *self.by_block.entry(block).or_insert_with(|| {
-            self.buckets.push((block, Bucket::default()));
-            self.buckets.len() - 1
-        });
-        self.current = Some((block, bucket));
+            None if !self.ledger.note(BUCKET) && !self.buckets.is_empty() => return 0,
+            None => {
+                let bucket = self.buckets.len();
+                self.buckets.push((block, Bucket::default()));
+                self.by_block.insert(block, bucket);
+                bucket
+            }
+        };
+        self.current = (block.map(|c| c << BLOCK_SHIFT), bucket);
         bucket
     }
 }
@@ -234,11 +238,9 @@ impl Hits for HitSorter<'_> {
 
     #[inline]
     fn hit(&mut self, _: Axis, at: [u32; 3], offset: u16) {
-        let block = at.map(|c| c >> BLOCK_SHIFT);
-        let bucket = match self.current {
-            Some((current, bucket)) if current == block => bucket,
-            _ => self.turn_to(block),
-        };
+        let (from, bucket) = self.current;
+        let is_elsewhere = ((at[0] ^ from[0]) | (at[1] ^ from[1]) | (at[2] ^ from[2])) >> BLOCK_SHIFT != 0;
+        let bucket = if is_elsewhere { self.turn_to(at) } else { bucket };
         let [x, y, z] = at.map(|c| c as usize & 63);
         let slot = SLOT_BITS[0][x] | SLOT_BITS[1][y] | SLOT_BITS[2][z];
         let hit = Hit(u64::from(slot) << 33 | u64::from(offset) << 17 | self.plane);
@@ -254,6 +256,11 @@ impl Hits for HitSorter<'_> {
     }
 }
 
+/// Whether some edge has several of the sorted hits.
+pub(super) fn is_repeated(hits: &[Hit]) -> bool {
+    hits.windows(2).any(|pair| pair[0].slot() == pair[1].slot())
+}
+
 /// The hits of some buckets, sorted by edge, then by offset, normal and orientation, to `hits`; what was there before is lost. Returns
 /// whether some edge has several.
 #[inline(never)]
@@ -264,7 +271,7 @@ pub(super) fn sort_hits(buckets: &[Bucket], hits: &mut Vec<Hit>, scratch: &mut V
         hits.clear();
         buckets.iter().flat_map(Bucket::chunks).for_each(|chunk| hits.extend_from_slice(chunk));
         hits.sort_unstable();
-        return hits.windows(2).any(|pair| pair[0].slot() == pair[1].slot());
+        return is_repeated(hits);
     }
     // Two stable passes over the 20 bits of the slot; hits that share an edge are few and sorted afterwards.
     let digit = |h: Hit, shift: u32| (h.0 >> shift) as usize & ((1 << DIGIT) - 1);

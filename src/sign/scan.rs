@@ -14,7 +14,7 @@
 //! Cost: about 20 ns a hit in all; 8 bytes a hit until its block is resolved, then 2 or 4 (see
 //! [`Crossings`]). The triangles are not kept. Orientations cost 1 ns and a bit a hit.
 
-use super::hits::{BlockCoords, Bucket, Hit, HitSorter, Ledger, brick_coords, sort_hits};
+use super::hits::{BlockCoords, Bucket, Hit, HitSorter, Ledger, brick_coords, is_repeated, sort_hits};
 use super::walls;
 use crate::error::Result;
 use crate::geom::Frame;
@@ -374,7 +374,7 @@ fn resolve_block<const ORIENTED: bool>(
         let at = std::array::from_fn(|a| block[a] * 8 + at[a]);
         let key = Key::cell(depth - 3, at).expect("hits lie in the root cube");
         let mut crossed = [Plane::EMPTY; 3];
-        if repeated {
+        if repeated && is_repeated(of_brick) {
             for edge in of_brick.chunk_by(|a, b| a.slot() == b.slot()) {
                 if ORIENTED {
                     orient_edge(edge, with_normals, &mut crossed, &mut out);

@@ -41,7 +41,7 @@ impl Hermites {
     /// Pushes the samples of brick number `i`, in order.
     pub(super) fn of_brick(&self, i: usize, samples: &mut Vec<Sample>) {
         let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        samples.extend(self.samples.range(start..self.ends[i]));
+        samples.extend_from_slice(&self.samples.slice(start..self.ends[i]));
     }
 }
 
