@@ -202,14 +202,18 @@ fn what_runs_out_of_the_grid_is_clipped() {
             assert_eq!(topology, Topology::new(1, 0), "scale {scale} {inside:?}: {:?}", repaired.report.warnings);
         }
     }
-    // All of the grid but a dent is inside: a cube without its lid, turned inside out, beside a small proper one.
-    let lidless = with_faces(
-        &unit_cube(),
-        unit_cube().faces.iter().filter(|face| !face.iter().all(|&i| unit_cube().points[i as usize].z == 1.0)),
-    );
-    let options = Options { scale: 0.99, inside: Inside::Winding, ..options(5, Surface::MarchingCubes, Faces::Auto) };
-    let repaired = repair(lidless, &options).expect("repairable");
-    check_repaired(&repaired).expect("a solid");
-    let clipped = |w: &Warning| matches!(w, Warning::Clipped(n) if *n > 0);
-    assert!(repaired.report.warnings.iter().filter(|w| clipped(w)).count() <= 1);
+    // A cube without its lid runs over, and ten of them so far that whole bricks at the boundary are inside.
+    let cube = unit_cube();
+    let lidless = |face: &&[u32]| !face.iter().all(|&i| cube.points[i as usize].z == 1.0);
+    for (cubes, depth, scale) in [(1, 5, 0.9), (10, 5, 0.9), (10, 7, 0.5), (10, 8, 0.9), (100, 8, 0.5)] {
+        let faces = (0..cubes).flat_map(|_| cube.faces.iter().filter(lidless));
+        let options = Options { scale, inside: Inside::Winding, ..options(depth, Surface::MarchingCubes, Faces::Auto) };
+        let repaired = repair(with_faces(&cube, faces), &options).expect("repairable");
+        assert_eq!(check_repaired(&repaired).expect("a solid"), Topology::new(1, 0));
+        let clipped = repaired.report.warnings.iter().find_map(|warning| match warning {
+            Warning::Clipped(points) => Some(*points),
+            _ => None,
+        });
+        assert_eq!(clipped.is_some(), cubes > 1, "{cubes} cubes: {clipped:?}");
+    }
 }

@@ -405,7 +405,8 @@ impl Disjoint<'_> {
         let i = crossings.find(key).expect("crossed edges belong to listed bricks");
         let brick = &crossings.bricks()[i];
         let place = brick.place(edge.axis(), Local::new(at[0], at[1], at[2]));
-        let before = self.cut.by_crossing.slice(brick.first as usize..place).iter().filter(|&cut| cut & POINT != 0).count();
+        let before =
+            self.cut.by_crossing.slice(brick.first as usize..place).iter().filter(|&cut| cut & POINT != 0).count();
         self.first_on_edges(i) + before as u32
     }
 }

@@ -95,6 +95,10 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     let mut signs: Vec<(Key, Plane)> = bricks.keys.iter().copied().zip(made.iter().map(|made| made.0)).collect();
     let ties = made.into_iter().enumerate().flat_map(|(i, (_, ties))| ties.into_iter().map(move |local| (i, local)));
     break_ties(depth, &mut signs, &ties.collect::<Vec<_>>(), uniform);
+    let edge = inside_at_boundary(depth, Key::ROOT, &bricks.keys, &uniform);
+    progress.hold((held + edge.len() * BRICK_BYTES) as u64)?;
+    signs.extend(edge.into_iter().map(|key| (key, Plane::FULL)));
+    signs.par_sort_unstable_by_key(|sign| sign.0);
     let mut clipped = 0;
     for (key, inside) in &mut signs {
         clipped += clip(depth, *key, inside);
@@ -148,6 +152,30 @@ fn break_ties(depth: u32, signs: &mut [(Key, Plane)], ties: &[(usize, Local)], u
     for (i, local) in turned.copied().collect::<Vec<_>>() {
         signs[i].1.toggle(local);
     }
+}
+
+/// The bricks of a cell at the root's boundary that are not among `keys`, which are sorted, and inside as a whole. Those that hang together
+/// without one of `keys` are all on one side.
+fn inside_at_boundary(depth: u32, cell: Key, keys: &[Key], uniform: &impl Fn(Key) -> bool) -> Vec<Key> {
+    let level = cell.level().expect("a cell");
+    let [first, last] = ends(depth, cell);
+    let is_at_boundary =
+        Face::ALL.into_iter().any(|face| (if face.is_high() { last } else { first }).neighbour(face).is_none());
+    let keys = &keys[keys.partition_point(|&key| key < first)..keys.partition_point(|&key| key <= last)];
+    if !is_at_boundary || level == depth - 3 && !keys.is_empty() || keys.is_empty() && !uniform(first) {
+        Vec::new()
+    } else if level == depth - 3 {
+        vec![cell]
+    } else {
+        cell.children().into_iter().flat_map(|child| inside_at_boundary(depth, child, keys, uniform)).collect()
+    }
+}
+
+/// The first and the last brick of a cell.
+fn ends(depth: u32, cell: Key) -> [Key; 2] {
+    let first = lattice_point(depth, cell).map(|c| c >> 3);
+    let side = 1 << (depth - 3 - cell.level().expect("a cell"));
+    [first, first.map(|c| c + side - 1)].map(|at| Key::cell(depth - 3, at).expect("in the root"))
 }
 
 /// Makes the points on the root's boundary outside. Returns how many points on it or next to it were inside.
@@ -291,7 +319,7 @@ impl Divide<'_> {
         let level = cell.level().expect("a cell");
         let bricks = self.depth - 3;
         if calm.is_some() || level == bricks {
-            return Parts { parts: vec![(self.ends(cell)[0], calm)], districts: Vec::new() };
+            return Parts { parts: vec![(ends(self.depth, cell)[0], calm)], districts: Vec::new() };
         }
         let (middle, radius) = self.ball(cell);
         let field = self.angles.within(field, middle, radius);
@@ -313,16 +341,9 @@ impl Divide<'_> {
         (lattice_point(self.depth, cell).map(|c| c + half), f64::from(half) * 3f64.sqrt())
     }
 
-    /// The first and the last brick of a cell.
-    fn ends(&self, cell: Key) -> [Key; 2] {
-        let first = lattice_point(self.depth, cell).map(|c| c >> 3);
-        let side = 1 << (self.depth - 3 - cell.level().expect("a cell"));
-        [first, first.map(|c| c + side - 1)].map(|at| Key::cell(self.depth - 3, at).expect("in the root"))
-    }
-
     /// The least number that is inside, if it is the same in all of the cell; `field` is that of a cell round it.
     fn calm(&self, cell: Key, field: &Field) -> Option<i32> {
-        let [first, last] = self.ends(cell);
+        let [first, last] = ends(self.depth, cell);
         let any = |keys: &[Key]| keys.get(keys.partition_point(|&key| key < first)).is_some_and(|&key| key <= last);
         if any(&self.spanned) {
             return None;
