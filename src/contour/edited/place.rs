@@ -3,7 +3,7 @@
 //! Every vertex starts at the mean of the places where the surface crosses the edges at its corners: the sample where the surface was there
 //! before, a quarter of a cell from the corner where edits made it. So a cut is half a cell wide, and a membrane as thick. Some rounds
 //! of averaging with the neighbours follow. Vertices of untouched cells stay, and no vertex leaves its octants: those of different cells
-//! and sheets never change places.
+//! and sheets never change places. Where a membrane ends at the root's boundary, the half of it that would lie beyond is flat.
 
 use super::polygons::Polygons;
 use super::shapes::Shape;
@@ -105,7 +105,7 @@ fn moved<'a>(
             let around = neighbours.of(i);
             let mean = around.iter().map(|&n| points[n as usize]).sum::<DVec3>() / around.len() as f64;
             let [low, high] = range(shape, vertex).map(|end| origin + end);
-            points[ring + i].lerp(mean, STEP).clamp(low, high)
+            touched.in_root(points[ring + i].lerp(mean, STEP).clamp(low, high))
         })
     })
 }
@@ -183,7 +183,8 @@ fn middles(touched: &Touched, brick: usize, points: &mut [DVec3]) {
         for vertex in 0..shape.vertices {
             let middle =
                 if shape.vertices == 1 { DVec3::splat(0.5) } else { middle_of_octants(shape.corners_of(vertex)) };
-            *points.next().expect("as many as the cells have") = DVec3::from(at.map(f64::from)) + middle;
+            *points.next().expect("as many as the cells have") =
+                touched.in_root(DVec3::from(at.map(f64::from)) + middle);
         }
     }
 }
@@ -249,7 +250,7 @@ impl Distances {
                 let is_irregular = shape.irregular >> vertex & 1 == 1;
                 let start = if is_irregular { mean.lerp(middle(), 0.5) } else { mean };
                 let [low, high] = range(shape, vertex);
-                *points.next().expect("as many as the cells have") = origin + start.clamp(low, high);
+                *points.next().expect("as many as the cells have") = touched.in_root(origin + start.clamp(low, high));
             }
         }
     }

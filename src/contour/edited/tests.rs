@@ -217,6 +217,9 @@ fn check(octree: &EditedOctree, dense: &Dense) {
     for (triangles, placement) in [(true, Placement::MassPoint), (false, Placement::SharpFeatures)] {
         let mesh = surface(octree, triangles, placement);
         assert_eq!(mesh.validate(), Ok(()), "triangles: {triangles}");
+        let root = frame(octree.signed().crossings().depth()).cube();
+        let is_in_root = |p: &DVec3| p.cmpge(root.min).all() && p.cmple(root.min + root.size).all();
+        assert!(mesh.points.iter().all(is_in_root), "elements at the root's boundary stay in the root");
         let report = mesh.report();
         let boundaries = dense.components(true) + dense.components(false) - 1;
         assert_eq!(report.components as usize, boundaries, "a surface for each component and each cavity");
@@ -355,7 +358,7 @@ fn edits_may_be_far_from_the_surface() {
     check(&EditedOctree::new(signed, changed(false), changed(true)), &dense);
 }
 
-/// Blocks keep to the middles of cells, and where a cell has several vertices, of their octants.
+/// Blocks keep to the middles of cells, and where a cell has several vertices, of their octants; beyond the root to its boundary.
 #[test]
 fn blocks_stay_blocks() {
     let inside = noise(17, 5, 4, 2);
@@ -367,7 +370,7 @@ fn blocks_stay_blocks() {
     let touched = Touched::new(&octree, &Silent).expect("not cancelled");
     let single = touched.bricks.iter().flat_map(super::touched::TouchedBrick::cells);
     let single = single.filter(|&(cell, _)| touched.shape(touched.cells[cell]).vertices == 1);
-    let middles: Vec<DVec3> = single.map(|(_, at)| DVec3::from(at.map(f64::from)) + 0.5).collect();
+    let middles: Vec<DVec3> = single.map(|(_, at)| touched.in_root(DVec3::from(at.map(f64::from)) + 0.5)).collect();
     assert!(middles.len() > 10);
     let there: HashSet<[u64; 3]> = mesh.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect();
     for middle in middles {

@@ -13,6 +13,7 @@ use crate::octree::crossings::lattice_point;
 use crate::octree::{EditedOctree, LinearOctree, SignedOctree};
 use crate::parallel::{in_order, pieces};
 use crate::progress::Progress;
+use glam::DVec3;
 use hashbrown::HashMap;
 use std::ops::Range;
 
@@ -88,6 +89,11 @@ fn stepped(at: At, corner: Corner, step: i32) -> At {
 }
 
 impl Touched {
+    /// The nearest point of the root, in cells: cells beyond its boundary have vertices, too.
+    pub(super) fn in_root(&self, p: DVec3) -> DVec3 {
+        p.clamp(DVec3::ZERO, DVec3::splat(f64::from(1u32 << self.depth)))
+    }
+
     /// Cost: linear in the edits, then some microseconds a brick and 60 ns a touched cell in parallel; while it lasts, 512 bytes an edited
     /// brick.
     ///
