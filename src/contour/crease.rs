@@ -37,6 +37,7 @@
 //! - The point is at most a cell away from the cell, and in the grid.
 //! - It is not [behind](is_behind) the only corner that is inside, or outside: three planes meet somewhere in any case, and the vertices of
 //!   eight cells round a tip of a few tenths of a cell went past it and each other, the surface inside out.
+//! - It does not [pierce](pierces) a thin wall: the groove that the tangent planes of a wall's ragged rim tell of may be deeper than the wall.
 //!
 //! Vertices that leave are drawn to their mass points a little ([`APART`]), for up to four cells may look for the same
 //! point. Along the crease they come in the order of their mass points, which may differ from that of the surface by
@@ -147,7 +148,42 @@ pub(super) fn is_behind(corner: Vec3A, mask: Mask, p: Vec3A) -> bool {
     Axis::ALL.iter().filter(|a| is_beyond(a)).count() >= 2
 }
 
+/// Whether a vertex that goes from its cell, with the least corner `corner`, to the cell of `p` comes out on the far side of what is thinner than
+/// a cell: if it leaves by corners of one sign, and no corner of that cell further on has it. `is_inside` tells of that cell's corners.
+pub(super) fn pierces(corner: Vec3A, mask: Mask, p: Vec3A, is_inside: impl Fn(Corner) -> bool) -> bool {
+    let way = (p - corner).floor();
+    let is_on_way =
+        |c: &Corner| Axis::ALL.iter().all(|&a| way[a.index()] == 0.0 || c.is_high(a) == (way[a.index()] > 0.0));
+    let corners = || Corner::ALL.into_iter().filter(is_on_way);
+    let leaves_by = |sign: bool| corners().all(|c| (mask >> c.index() & 1 == 1) == sign);
+    [false, true].into_iter().any(|sign| leaves_by(sign) && corners().all(|c| is_inside(c) != sign))
+}
+
 /// Whether a point is at most a cell away from the box along each axis.
 fn is_near(low: Vec3A, high: Vec3A, p: Vec3A) -> bool {
     p.cmpge(low - 1.0).all() && p.cmple(high + 1.0).all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walls_thinner_than_a_cell_are_not_pierced() {
+        let cell = Vec3A::new(4.0, 3.0, 2.0);
+        // The wall's points are below the cell, and end at its low x.
+        let below = Corner::ALL.into_iter().filter(|c| !c.is_high(Axis::Z)).fold(0, |mask, c| mask | 1u8 << c.index());
+        let through = cell + Vec3A::new(-0.03, 0.4, -0.4);
+        // The corners of the cell across its rim that are inside: those of the rim, or the deeper ones as well.
+        let rim = |c: Corner| c.is_high(Axis::X) && c.is_high(Axis::Z);
+        let thick = |c: Corner| c.is_high(Axis::X) || !c.is_high(Axis::Z);
+        assert!(pierces(cell, below, through, rim));
+        assert!(!pierces(cell, below, through, thick));
+        // A gap is as a wall.
+        assert!(pierces(cell, !below, through, |c| !rim(c)));
+        assert!(!pierces(cell, !below, through, |c| !thick(c)));
+        // Sideways it leaves by corners of both signs, and in the cell it leaves by none.
+        assert!(!pierces(cell, below, cell + Vec3A::new(-0.4, 0.4, 0.4), rim));
+        assert!(!pierces(cell, below, cell + 0.5, |_| true));
+    }
 }

@@ -1,6 +1,6 @@
 //! Where the vertices of dual surfaces go: the planes of their cells, added up; [`crease`](super::crease) finds the point.
 
-use super::crease::{APART, Beyond, common_point, is_behind, is_creased, solve};
+use super::crease::{APART, Beyond, common_point, is_behind, is_creased, pierces, solve};
 use super::dual::Placement;
 use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
@@ -59,9 +59,12 @@ impl Planes {
         let mixed = layout.mixed(brick);
         let origin = layout.octree.crossings().origin(cells.brick());
         let side = 1 << layout.octree.crossings().depth();
-        let beyond = |p: Vec3A| {
+        let cell_of = |p: Vec3A| -> [u32; 3] {
             let at = p.floor().to_array().map(|c| c as i32);
-            let at: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
+            std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]))
+        };
+        let beyond = |p: Vec3A| {
+            let at = cell_of(p);
             match layout.style {
                 Style::Usual if at.iter().all(|&c| c < side) => {
                     if layout.is_mixed(at) {
@@ -79,8 +82,15 @@ impl Planes {
             let place = |p| place(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
                 None => {
-                    let beyond = |p| {
-                        if is_behind(least_corner(cell), cells.mask(cell), p) { Beyond::Barred } else { beyond(p) }
+                    let (corner, mask) = (least_corner(cell), cells.mask(cell));
+                    let is_inside = |p, c| {
+                        let at = cell_of(p);
+                        layout.octree.is_inside(Axis::ALL.map(|a| at[a.index()] + u32::from(c & a)))
+                    };
+                    let beyond = |p| match beyond(p) {
+                        _ if is_behind(corner, mask, p) => Beyond::Barred,
+                        Beyond::Taken if pierces(corner, mask, p, |c| is_inside(p, c)) => Beyond::Barred,
+                        there => there,
                     };
                     self.place_ordinary(cell, placement, given(cell), &beyond, place)
                 }
