@@ -86,7 +86,7 @@ const SHARP: f32 = 0.025 * 0.025;
 /// What is at a point outside of a cell, as far as vertices that would go there are concerned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Beyond {
-    /// None may go there: it lies outside of the grid, or vertices stay in their cells.
+    /// The vertex may not go there: it is outside of the grid, behind or through the solid, or vertices stay in their cells.
     Barred,
     /// A cell without a vertex.
     Empty,
