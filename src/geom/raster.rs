@@ -155,9 +155,9 @@ impl Projection {
         }
         match self.columns.1 - self.columns.0 {
             ..=2 => self.scan_narrow::<2>(axis, hits),
-            ..=4 => self.scan_narrow::<4>(axis, hits),
-            ..=6 => self.scan_narrow::<6>(axis, hits),
-            ..=BAND => self.scan_narrow::<{ BAND as usize }>(axis, hits),
+            3..=4 => self.scan_narrow::<4>(axis, hits),
+            5..=6 => self.scan_narrow::<6>(axis, hits),
+            7..=BAND => self.scan_narrow::<{ BAND as usize }>(axis, hits),
             _ => self.scan_wide(axis, hits),
         }
     }
