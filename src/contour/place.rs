@@ -59,41 +59,28 @@ impl Planes {
         let mixed = layout.mixed(brick);
         let origin = layout.octree.crossings().origin(cells.brick());
         let side = 1 << layout.octree.crossings().depth();
-        let cell_of = |p: Vec3A| -> [u32; 3] {
+        let beyond = |cell: Local, p: Vec3A| {
             let at = p.floor().to_array().map(|c| c as i32);
-            std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]))
-        };
-        let beyond = |p: Vec3A| {
-            let at = cell_of(p);
-            match layout.style {
-                Style::Usual if at.iter().all(|&c| c < side) => {
-                    if layout.is_mixed(at) {
-                        Beyond::Taken
-                    } else {
-                        Beyond::Empty
-                    }
-                }
-                _ => Beyond::Barred,
+            let at: [u32; 3] = std::array::from_fn(|a| origin[a].wrapping_add_signed(at[a]));
+            if layout.style != Style::Usual || at.iter().any(|&c| c >= side) {
+                return Beyond::Barred;
+            }
+            let (corner, mask) = (least_corner(cell), cells.mask(cell));
+            let is_inside = |c| layout.octree.is_inside(Axis::ALL.map(|a| at[a.index()] + u32::from(c & a)));
+            match layout.is_mixed(at) {
+                _ if is_behind(corner, mask, p) => Beyond::Barred,
+                true if pierces(corner, mask, p, is_inside) => Beyond::Barred,
+                true => Beyond::Taken,
+                false => Beyond::Empty,
             }
         };
         let mut creased = Plane::EMPTY;
         let mut knots = layout.knots_of(brick).iter().peekable();
         mixed.iter().for_each(|cell| {
             let place = |p| place(cell, p);
+            let beyond = |p| beyond(cell, p);
             let is_creased = match knots.next_if(|k| k.cell == cell) {
-                None => {
-                    let (corner, mask) = (least_corner(cell), cells.mask(cell));
-                    let is_inside = |p, c| {
-                        let at = cell_of(p);
-                        layout.octree.is_inside(Axis::ALL.map(|a| at[a.index()] + u32::from(c & a)))
-                    };
-                    let beyond = |p| match beyond(p) {
-                        _ if is_behind(corner, mask, p) => Beyond::Barred,
-                        Beyond::Taken if pierces(corner, mask, p, |c| is_inside(p, c)) => Beyond::Barred,
-                        there => there,
-                    };
-                    self.place_ordinary(cell, placement, given(cell), &beyond, place)
-                }
+                None => self.place_ordinary(cell, placement, given(cell), &beyond, place),
                 Some(_) if layout.style == Style::Disjoint => self.skip_knot(cell),
                 Some(&knot) => self.place_knot(knot, placement, given(cell), &beyond, place),
             };

@@ -45,10 +45,8 @@ pub trait Hits {
     }
 }
 
-/// Rows of a triangle between two looks at [`Hits::is_enough`]: some milliseconds in the finest grid, and more than a small triangle has.
-const ROWS: i64 = 16;
-
-/// Rows of a triangle of few columns that are looked at together, and the most of such columns.
+/// Rows of a triangle between two looks at [`Hits::is_enough`], some milliseconds in the finest grid; where there are no more columns than
+/// that, they are looked at together.
 const BAND: i64 = 8;
 
 /// Extra bits of the fixed-point depth below 1/65536 of a cell.
@@ -211,7 +209,7 @@ impl Projection {
         let width = self.columns.1 - self.columns.0;
         let mut plane = None;
         for row in 0..self.rows.1 - self.rows.0 {
-            if row % ROWS == ROWS - 1 && hits.is_enough() {
+            if row % BAND == BAND - 1 && hits.is_enough() {
                 return;
             }
             let (first, end) = inside_of_row(sides.each_ref().map(|side| side.start + row * side.dv), steps, width);

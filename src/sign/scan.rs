@@ -333,9 +333,9 @@ fn resolve<const ORIENTED: bool>(
         let block = blocks[n].lock().expect("locked once").take();
         let (block, buckets) = block.expect("each block is resolved once");
         let freed = buckets.iter().map(Bucket::bytes).sum();
-        let repeated = sort_hits(&buckets, hits, spare);
+        sort_hits(&buckets, hits, spare);
         drop(buckets);
-        Resolved { freed, ..resolve_block::<ORIENTED>(block, hits, repeated, depth, with_normals) }
+        Resolved { freed, ..resolve_block::<ORIENTED>(block, hits, depth, with_normals) }
     };
     let append = |block: Resolved| {
         held -= block.freed / REUSED[1] * REUSED[0];
@@ -354,15 +354,9 @@ fn are_doubtful(mut offsets: impl Iterator<Item = u16>) -> bool {
     offsets.fold(false, |doubtful, offset| doubtful ^ (offset - std::mem::replace(&mut last, offset) <= COINCIDENT))
 }
 
-/// What a block comes to, from its sorted hits; `repeated` says whether some edge has several.
+/// What a block comes to, from its sorted hits.
 #[inline(never)]
-fn resolve_block<const ORIENTED: bool>(
-    block: BlockCoords,
-    hits: &[Hit],
-    repeated: bool,
-    depth: u32,
-    with_normals: bool,
-) -> Resolved {
+fn resolve_block<const ORIENTED: bool>(block: BlockCoords, hits: &[Hit], depth: u32, with_normals: bool) -> Resolved {
     let mut out = Resolved { hits: hits.len() as u64, ..Resolved::default() };
     out.offsets.reserve_exact(hits.len());
     out.normals.reserve_exact(if with_normals { hits.len() } else { 0 });
@@ -374,7 +368,7 @@ fn resolve_block<const ORIENTED: bool>(
         let at = std::array::from_fn(|a| block[a] * 8 + at[a]);
         let key = Key::cell(depth - 3, at).expect("hits lie in the root cube");
         let mut crossed = [Plane::EMPTY; 3];
-        if repeated && is_repeated(of_brick) {
+        if is_repeated(of_brick) {
             for edge in of_brick.chunk_by(|a, b| a.slot() == b.slot()) {
                 if ORIENTED {
                     orient_edge(edge, with_normals, &mut crossed, &mut out);

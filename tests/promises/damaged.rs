@@ -14,11 +14,14 @@ use zmend::mesh::{Bounds, HealOptions};
 use zmend::progress::Silent;
 use zmend::{Error, Mesh, Options, Repaired, Surface, repair, repair_keeping_good};
 
-/// Cases that once broke a promise: 37255 had bounds of an angle beyond the range of whole numbers; 142582 took a minute and a half, for the
-/// healing of good parts compared each point with each other one; of 384769 whole bricks at the boundary of the grid are
-/// inside; a membrane of 367473 ends there, and half of it was outside of the grid; vertices of 377805 went through a thin sheet, which was inside
-/// out.
-const FOUND: [u64; 5] = [37_255, 142_582, 367_473, 377_805, 384_769];
+/// Cases that once broke a promise.
+const FOUND: [u64; 5] = [
+    37_255,  // Bounds of an angle were beyond the range of whole numbers.
+    142_582, // The healing of good parts compared each point with each other one, for a minute and a half.
+    367_473, // A membrane ends at the boundary of the grid, and half of it was outside.
+    377_805, // Vertices went through a thin sheet, which was inside out.
+    384_769, // Whole bricks at the boundary of the grid are inside, and were not clipped.
+];
 /// The first case. The next 140 are quick; slow ones are for the long run.
 const FIRST: u64 = 200;
 /// Cases of a run in CI.

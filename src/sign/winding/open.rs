@@ -162,12 +162,16 @@ fn inside_at_boundary(depth: u32, cell: Key, keys: &[Key], uniform: &impl Fn(Key
     let is_at_boundary =
         Face::ALL.into_iter().any(|face| (if face.is_high() { last } else { first }).neighbour(face).is_none());
     let keys = &keys[keys.partition_point(|&key| key < first)..keys.partition_point(|&key| key <= last)];
-    if !is_at_boundary || level == depth - 3 && !keys.is_empty() || keys.is_empty() && !uniform(first) {
-        Vec::new()
-    } else if level == depth - 3 {
-        vec![cell]
-    } else {
-        cell.children().into_iter().flat_map(|child| inside_at_boundary(depth, child, keys, uniform)).collect()
+    if !is_at_boundary {
+        return Vec::new();
+    }
+    match (keys.is_empty(), level == depth - 3) {
+        (false, true) => Vec::new(),
+        (true, _) if !uniform(first) => Vec::new(),
+        (true, true) => vec![cell],
+        (_, false) => {
+            cell.children().into_iter().flat_map(|child| inside_at_boundary(depth, child, keys, uniform)).collect()
+        }
     }
 }
 
