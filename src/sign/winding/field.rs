@@ -205,8 +205,8 @@ impl Field {
     }
 
     /// Bounds of the first and of the second derivatives of the winding number in a ball, in any direction, for each fixed-point unit.
-    /// Infinite where the boundary comes into the ball.
-    pub(super) fn steepness(&self, span: &Span, centre: DVec3, radius: f64) -> [f64; 2] {
+    /// Infinite where the boundary comes into the ball, and where the second is above `most`.
+    pub(super) fn steepness(&self, span: &Span, centre: DVec3, radius: f64, most: f64) -> [f64; 2] {
         let distance = |node: &Node| node.centre().distance(centre) - f64::from(node.radius) - radius;
         let [mut first, mut second] = self.steepness;
         for near in self.near(span, |node| distance(node) > 2.0 * f64::from(node.radius)) {
@@ -229,6 +229,9 @@ impl Field {
                         second += share / distance;
                     }
                 }
+            }
+            if second > most {
+                return [f64::INFINITY; 2];
             }
         }
         [first, second]
@@ -426,7 +429,7 @@ mod tests {
                     let mut beyond = at;
                     beyond[axis] += step;
                     let rise = plain(span, beyond) - plain(span, at);
-                    let [first, second] = field.steepness(span, position(at), f64::from(step));
+                    let [first, second] = field.steepness(span, position(at), f64::from(step), f64::INFINITY);
                     if first.is_finite() && rise.abs() < 0.5 {
                         let slack = 1e-9 + 0.5 * second * f64::from(step).powi(2);
                         assert!(rise.abs() <= first * f64::from(step) + 1e-9, "{rise} {first}");

@@ -356,7 +356,7 @@ impl Divide<'_> {
         if self.angles.are_minor(field, middle, radius) {
             return Some(least(0.0));
         }
-        let [first_order, _] = self.angles.steepness(field, middle, radius);
+        let [first_order, _] = self.angles.steepness(field, middle, radius, f64::INFINITY);
         let reach = first_order * radius + ERROR;
         if reach.is_infinite() {
             return None;
@@ -424,10 +424,11 @@ impl<'a> Angles<'a> {
         field.is_minor(&self.patches.span, self.place(point), radius * self.unit())
     }
 
-    /// Bounds of the angle's derivatives by the cell, so many cells around a point.
-    fn steepness(&self, field: &Field, point: [u32; 3], radius: f64) -> [f64; 2] {
+    /// Bounds of the angle's derivatives by the cell, so many cells around a point; infinite if the second is above `most`.
+    fn steepness(&self, field: &Field, point: [u32; 3], radius: f64, most: f64) -> [f64; 2] {
         let unit = self.unit();
-        let [first, second] = field.steepness(&self.patches.span, self.place(point), radius * unit);
+        let [first, second] =
+            field.steepness(&self.patches.span, self.place(point), radius * unit, most / (unit * unit));
         [first * unit, second * unit * unit]
     }
 
@@ -523,9 +524,10 @@ impl Rough<'_> {
             }
             return;
         }
-        let [_, second] = self.angles.steepness(&self.field, at, radius);
-        let reach = |squared: f64| 0.5 * second * squared + ERROR;
-        if reach(radius * radius) > MOST {
+        // Above this, what the block's middle knows decides too little.
+        let most = 2.0 * (MOST - ERROR) / (radius * radius);
+        let [_, second] = self.angles.steepness(&self.field, at, radius, most);
+        if second > most {
             let span = &self.angles.patches.span;
             let angles = self.view.angles(span, &self.field, self.angles.fine(at), 1 << self.angles.shift);
             for (local, angle) in locals.zip(angles) {
@@ -534,6 +536,7 @@ impl Rough<'_> {
             }
             return;
         }
+        let reach = |squared: f64| 0.5 * second * squared + ERROR;
         let (angle, slope) = self.angles.tangent(&self.field, at);
         let number = self.number(middle);
         for local in locals {
