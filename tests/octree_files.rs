@@ -462,6 +462,19 @@ fn too_fine_to_be_put_into_a_larger_cube() {
     assert!(error.contains("disagree") || error.contains("too fine"), "{error}");
 }
 
+/// A few bytes said that a huge cube is full, and its sides took minutes and gigabytes.
+#[test]
+fn a_few_bytes_do_not_become_a_huge_surface() {
+    let full = |cells: i32| [&cells.to_le_bytes()[..], &[1, 0]].concat();
+    let file = read_octree_bytes("small.sof", &full(256), Some(OctreeFormat::Sof)).expect("a full cube");
+    assert_eq!(file.octree.crossings().len(), 6 * 257 * 257);
+    for cells in [1 << 10, 1 << 16] {
+        let error =
+            read_octree_bytes("full.sof", &full(cells), Some(OctreeFormat::Sof)).expect_err("too many").to_string();
+        assert!(error.contains("full.sof") && error.contains("6 bytes") && error.contains("margin"), "{error}");
+    }
+}
+
 /// The nodes of an SOF file below a cell, with leaves of `coarse` cells in one half.
 fn simplified(at: [u32; 3], side: u32, coarse: u32, inside: &dyn Fn([u32; 3]) -> bool, out: &mut Vec<u8>) {
     let corners = (0..8u32).map(|i| inside(std::array::from_fn(|a| at[a] + side * (i >> (2 - a) & 1))));

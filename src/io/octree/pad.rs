@@ -10,7 +10,7 @@ use super::check::{corners_of, plane_of};
 use super::decode::{Decoded, Divided, Source};
 use crate::geom::frame::DEPTHS;
 use crate::grid::brick::{Local, Plane};
-use crate::grid::{Axis, Corner, Direction, Key};
+use crate::grid::{Axis, Corner, Direction, Face, Key};
 use crate::octree::crossings::lattice_point;
 use ahash::RandomState;
 use hashbrown::HashMap;
@@ -87,6 +87,16 @@ impl Decoded {
             }
             brick.corners = corners_of(points, |_| Plane::EMPTY);
         }
+    }
+
+    /// How many sides of bricks inside lie on the side of the cube, those of bricks with both signs not counted. Each becomes surface.
+    pub(super) fn filled_sides(&self) -> u64 {
+        let inside = self.uniform.iter().filter(|(_, is_inside)| *is_inside);
+        let of_cell = |&(cell, _): &(Key, bool)| {
+            let sides = Face::ALL.into_iter().filter(|&face| cell.neighbour(face).is_none()).count();
+            (sides as u64) << (2 * (self.depth - 3 - cell.level().expect("cells have levels")))
+        };
+        inside.map(of_cell).sum()
     }
 
     /// The bricks of a cell of one sign that lie on the side of the cube, some of them several times.

@@ -97,6 +97,12 @@ struct Reading<'a, R> {
     progress: &'a dyn Progress,
 }
 
+/// Sides of bricks that a solid may fill on the side of its cube, whatever the file is: a million faces. A full cube of 256 cells a side has a
+/// third of it.
+const MOST_SIDES: u64 = 1 << 14;
+/// Bytes of the file for each side more, so that its size bounds memory and time.
+const BYTES_A_SIDE: u64 = 32;
+
 type Parts = (SignedOctree, Frame, Option<StoredPoints>);
 
 impl<R: Read> Reading<'_, R> {
@@ -149,6 +155,13 @@ impl<R: Read> Reading<'_, R> {
             return Err(self.disagreement(point));
         }
         // The solid touches the side of its cube.
+        let (sides, len) = (decoded.filled_sides(), self.info.bytes);
+        if sides > MOST_SIDES + len / BYTES_A_SIDE {
+            let problem =
+                format!("the solid fills sides of its cube: {len} bytes would become {} faces there", 64 * sides);
+            let remedy = "write the octree again with a margin of at least one cell on all sides";
+            return Err(Error::format(self.name, Place::Whole, problem, remedy));
+        }
         let shift = 1 << decoded.depth;
         let Some(decoded) = decoded.padded() else {
             let problem = "the solid touches the side of its cube, and the grid is too fine for a larger one";
