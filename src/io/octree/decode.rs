@@ -11,7 +11,7 @@ use super::coarse::MOST_CELLS;
 use super::dialect::{Dialect, Header, Node};
 use crate::error::Result;
 use crate::grid::brick::{Local, Plane};
-use crate::grid::key::{SIDE, deinterleave};
+use crate::grid::key::SIDE;
 use crate::grid::{Corner, Key};
 use crate::io::bytes::Bytes;
 use crate::octree::cells::transposed;
@@ -161,19 +161,8 @@ fn after(mut cell: Key, root: Key) -> Option<Key> {
 /// Where in its brick a cell lies.
 #[inline]
 fn at(depth: u32, cell: Key) -> Local {
-    /// The position of the least corner by its place in the Z-order of the brick.
-    static BY_ORDER: [Local; 512] = {
-        let mut all = [Local::new(0, 0, 0); 512];
-        let mut i = 0;
-        while i < 512 {
-            let [x, y, z] = deinterleave(i);
-            all[i as usize] = Local::new(x, y, z);
-            i += 1;
-        }
-        all
-    };
     let finest = SIDE.ilog2() - depth;
-    BY_ORDER[(cell.code_inside(Corner::MIN) >> (3 * finest) & 511) as usize]
+    Local::from_order(cell.code_inside(Corner::MIN) >> (3 * finest))
 }
 
 /// Adds the corners of leaves that are inside to the planes of a brick: a row of eight cells is a matrix of 8 x 8 bits, transposed.
