@@ -293,31 +293,41 @@ impl Rim<'_> {
     /// The vector area of the square across an edge.
     #[inline]
     fn square(&self, edge: Spot) -> [f64; 3] {
-        let axis = edge.extent.axes().next().expect("an edge has an axis");
-        let [u, v] = axis.others();
+        // X, Y, Z are bits 4, 2, 1. All that depends on the axis alone is worked out by the compiler.
+        match edge.extent.bits() {
+            4 => self.square_across::<0>(edge),
+            2 => self.square_across::<1>(edge),
+            _ => self.square_across::<2>(edge),
+        }
+    }
+
+    /// The same for an edge along axis `A`.
+    #[inline]
+    fn square_across<const A: usize>(&self, edge: Spot) -> [f64; 3] {
+        let [u, v] = Axis::ALL[A].others();
         let back = |(brick, local): (u32, Local), axis| self.complex.step(brick, local, Face::new(axis, false));
-        // The cells round the edge: low and high along u, and the same low along v.
+        // The cells round the edge: high and low along u, and then the same low along v.
         let high = Some((edge.brick, edge.local));
         let low = back((edge.brick, edge.local), u);
         let cells = [high, low, high.and_then(|at| back(at, v)), low.and_then(|at| back(at, v))];
         let is_moved = |&(brick, cell): &(u32, Local)| self.signs.code(brick, cell) != 0;
+        let mut square = [0.0; 3];
         if !cells.iter().flatten().any(is_moved) {
-            return std::array::from_fn(|a| if a == axis.index() { 1.0 } else { 0.0 });
+            square[A] = 1.0;
+            return square;
         }
+        let [hh, lh, hl, ll] = cells.map(|cell| cell.map_or([0.0; 3], |cell| self.signs.moved(self.complex, cell)));
         // Half the cross product of the diagonals, from (low, low) to (high, high) and from (high, low) to (low, high).
-        let mut diagonals = [[0.0; 3]; 2];
-        for (cell, second, sign, high_u, high_v) in
-            [(0, 0, 1.0, true, true), (3, 0, -1.0, false, false), (1, 1, 1.0, false, true), (2, 1, -1.0, true, false)]
-        {
-            let diagonal = &mut diagonals[second];
-            diagonal[u.index()] += sign * if high_u { 0.5 } else { -0.5 };
-            diagonal[v.index()] += sign * if high_v { 0.5 } else { -0.5 };
-            if let Some(cell) = cells[cell] {
-                let moved = self.signs.moved(self.complex, cell);
-                (0..3).for_each(|a| diagonal[a] += sign * moved[a]);
-            }
-        }
-        let [p, q] = diagonals;
+        let diagonal = |from: [f64; 3], to: [f64; 3], along_u: f64| {
+            let mut diagonal = [0.0; 3];
+            (diagonal[u.index()], diagonal[v.index()]) = (along_u, 0.5);
+            (0..3).for_each(|a| diagonal[a] += to[a]);
+            diagonal[u.index()] += along_u;
+            diagonal[v.index()] += 0.5;
+            (0..3).for_each(|a| diagonal[a] -= from[a]);
+            diagonal
+        };
+        let (p, q) = (diagonal(ll, hh, 0.5), diagonal(hl, lh, -0.5));
         std::array::from_fn(|a| {
             let (b, c) = ((a + 1) % 3, (a + 2) % 3);
             (p[b] * q[c] - p[c] * q[b]) / 2.0
