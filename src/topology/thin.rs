@@ -352,29 +352,15 @@ impl Work {
                 (marked, next) => (marked.unwrap_or(&Plane::EMPTY), next.unwrap_or(&Plane::EMPTY)),
             };
             let (lower, upper) = (extent.index(), (extent | axis).index());
-            let (mut low, mut high) = (Plane::EMPTY, Plane::EMPTY);
-            for x in 0..8 {
-                let here = marked.0[x];
-                let further = match axis {
-                    Axis::X => {
-                        if x == 7 {
-                            next.0[0]
-                        } else {
-                            marked.0[x + 1]
-                        }
-                    }
-                    Axis::Y => here >> 8 | next.0[x] << 56,
-                    Axis::Z => here >> 1 & !(Z0 << 7) | (next.0[x] & Z0) << 7,
-                };
-                low.0[x] = here & live[upper].0[x];
-                high.0[x] = further & live[upper].0[x] & !here;
-            }
+            let there = live[upper];
+            let low = *marked & there;
+            let high = marked.at_plus(axis, next) & there & !*marked;
             let both = low | high;
             if both.is_empty() {
                 continue;
             }
             live[lower] &= !(low | high.at_minus(axis, &Plane::EMPTY));
-            live[upper] &= !both;
+            live[upper] = there & !both;
             *carry = high.high_layer(axis);
             self.lost |= lost(&both, extent | axis);
             if extent.dimension() > 0 {

@@ -7,7 +7,7 @@
 
 use super::polygons::Polygons;
 use super::shapes::Shape;
-use super::touched::{Touched, TouchedCell};
+use super::touched::{Touched, TouchedBrick, TouchedCell};
 use crate::contour::Placement;
 use crate::grid::brick::{Bits, Local};
 use crate::grid::cases::Mask;
@@ -17,12 +17,11 @@ use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::position;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// How far from the solid's points the surface runs where edits made it, in cells: a gap between two points one cell apart and a membrane
 /// are half a cell thick, both.
 const DISTANCE: f64 = 0.25;
-/// Vertices keep this distance from the sides of their octants, in cells.
-const MARGIN: f64 = 1.0 / 64.0;
 /// Rounds of averaging. In slanted membranes and cuts through a torus the steps of the grid are gone after six; after twenty nothing is
 /// visibly different.
 const ROUNDS: usize = 6;
@@ -75,7 +74,7 @@ fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: us
     let mut waiting: Vec<(usize, Vec<DVec3>)> = Vec::new();
     for wave in (0..count).step_by(WAVE) {
         let end = count.min(wave + WAVE);
-        let moved = |n| (n, piece(n).flat_map(|brick| moved(touched, neighbours, ring, points, brick)).collect());
+        let moved = |n| (n, moved(touched, neighbours, ring, points, piece(n)));
         waiting.par_extend((wave..end).into_par_iter().map(moved));
         waiting.retain(|(n, moved)| {
             let is_asked = askers[*n] >= end;
@@ -88,26 +87,26 @@ fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: us
     }
 }
 
-/// Where the vertices of a brick go in a round.
-fn moved<'a>(
-    touched: &'a Touched,
-    neighbours: &'a Neighbours,
+/// Where the vertices of some bricks go in a round.
+fn moved(
+    touched: &Touched,
+    neighbours: &Neighbours,
     ring: usize,
-    points: &'a [DVec3],
-    brick: usize,
-) -> impl Iterator<Item = DVec3> + 'a {
-    touched.bricks[brick].cells().flat_map(move |(cell, at)| {
-        let cell = touched.cells[cell];
-        let shape = touched.shape(cell);
+    points: &[DVec3],
+    bricks: Range<usize>,
+) -> Vec<DVec3> {
+    let mut moved = Vec::with_capacity((touched.first_of(bricks.end) - touched.first_of(bricks.start)) as usize);
+    for (cell, at) in touched.bricks[bricks].iter().flat_map(TouchedBrick::cells) {
+        let TouchedCell { first, shape, .. } = touched.cells[cell];
         let origin = DVec3::from(at.map(f64::from));
-        (0..shape.vertices).map(move |vertex| {
-            let i = cell.first as usize + usize::from(vertex);
+        for (i, [low, high]) in (first as usize..).zip(&touched.shapes[usize::from(shape)].ranges) {
             let around = neighbours.of(i);
             let mean = around.iter().map(|&n| points[n as usize]).sum::<DVec3>() / around.len() as f64;
-            let [low, high] = range(shape, vertex).map(|end| origin + end);
-            touched.in_root(points[ring + i].lerp(mean, STEP).clamp(low, high))
-        })
-    })
+            let to = points[ring + i].lerp(mean, STEP).clamp(origin + *low, origin + *high);
+            moved.push(touched.in_root(to));
+        }
+    }
+    moved
 }
 
 /// Calls `each` for all bricks, in parallel, with the places for the results of the brick's vertices.
@@ -200,22 +199,6 @@ fn position_of(corner: Corner) -> DVec3 {
     DVec3::from(Axis::ALL.map(|a| f64::from(u8::from(corner & a))))
 }
 
-/// The corners on the low side of each axis.
-const LOW: [Mask; 3] = [0x0f, 0x33, 0x55];
-
-/// Where a vertex may go, from where its cell starts.
-#[inline]
-fn range(shape: &Shape, vertex: u8) -> [DVec3; 2] {
-    if shape.vertices == 1 {
-        return [DVec3::splat(MARGIN), DVec3::splat(1.0 - MARGIN)];
-    }
-    let corners = shape.corners_of(vertex);
-    [
-        DVec3::from(LOW.map(|side| if corners & side != 0 { MARGIN } else { 0.5 + MARGIN })),
-        DVec3::from(LOW.map(|side| if corners & !side != 0 { 1.0 - MARGIN } else { 0.5 - MARGIN })),
-    ]
-}
-
 /// How far along their edges the crossings of a brick are.
 struct Distances {
     edges: EdgeTable<f64>,
@@ -249,7 +232,7 @@ impl Distances {
                 let mean = if n == 0.0 { middle() } else { sum / n };
                 let is_irregular = shape.irregular >> vertex & 1 == 1;
                 let start = if is_irregular { mean.lerp(middle(), 0.5) } else { mean };
-                let [low, high] = range(shape, vertex);
+                let [low, high] = shape.ranges[usize::from(vertex)];
                 *points.next().expect("as many as the cells have") = touched.in_root(origin + start.clamp(low, high));
             }
         }
