@@ -164,7 +164,7 @@ fn around<const A: usize, const U: usize, const V: usize>(
 }
 
 /// [`sources`] through the face on one side, along axis `U`, of an edge along axis `A`.
-#[inline(always)]
+#[inline]
 fn through<const A: usize, const U: usize, const HIGH: bool>(
     complex: &Complex,
     edge: Spot,

@@ -226,6 +226,7 @@ fn once_covered(live: &Planes, low: [&Planes; 3], x: usize) -> [u64; 7] {
 /// For word `x` of the elements that have `upper` beside them along an axis, on either side: those for which just one is there, and those for
 /// which both are.
 #[inline(always)]
+#[expect(clippy::inline_always, reason = "axis and extent are known where it is called: a few operations are left")]
 fn along(live: &Planes, low: [&Planes; 3], x: usize, upper: Extent, axis: Axis) -> (u64, u64) {
     let next = &low[axis.index()][upper.index()];
     let above = live[upper.index()].0[x];
