@@ -255,9 +255,8 @@ impl Signs {
         };
         let brick = beyond(beyond(brick, Axis::X, x > 7, dx > 0), Axis::Y, y > 7, dy > 0);
         let row = |brick: u32| match brick {
-            NOTHING => 0,
             DEEP if complex.side() == Side::Object => 0xff,
-            DEEP => 0,
+            NOTHING | DEEP => 0,
             _ => self.inside[brick as usize].0[(x & 7) as usize] >> (8 * (y & 7)) & 0xff,
         };
         match z {

@@ -104,7 +104,7 @@ impl<'a> Around<'a> {
         if cell.shape != FOUND {
             let steps = [index / STEP[0], index / STEP[1] % SIDE, index % SIDE];
             let at = std::array::from_fn(|a| (8 * self.brick[a] + steps[a] as i32 - 1) as u32);
-            let [x, y, z] = steps.map(|step| (step + 7) / 8);
+            let [x, y, z] = steps.map(|step| step.div_ceil(8));
             let place = &mut self.places[9 * x + 3 * y + z];
             if *place == UNTOUCHED {
                 *place = layout.brick_of(at) as u32;

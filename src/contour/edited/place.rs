@@ -15,6 +15,9 @@ use crate::grid::{Axis, Corner, Edge};
 use crate::octree::SignedOctree;
 use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::position;
+use crate::octree::segments::Segments;
+use crate::parallel::in_order;
+use crate::progress::Silent;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -29,6 +32,9 @@ const ROUNDS: usize = 6;
 /// again.
 const STEP: f64 = 0.5;
 
+/// Positions, in segments: they grow into the room that topology repair leaves behind.
+pub(super) type Points = Segments<DVec3, 12>;
+
 /// The positions of the vertices of touched cells, in cells, appended to `fixed`, those of the ring. Cost: linear in vertices and their
 /// neighbours, in parallel.
 pub(super) fn place(
@@ -36,20 +42,31 @@ pub(super) fn place(
     placement: Placement<'_>,
     touched: &Touched,
     neighbours: &Neighbours,
-    fixed: Vec<DVec3>,
-) -> Vec<DVec3> {
+    fixed: Points,
+) -> Points {
     let ring = fixed.len();
     let mut points = fixed;
-    points.resize(ring + touched.vertices as usize, DVec3::ZERO);
+    let (count, piece) = touched.pieces();
+    let of_bricks = |distances: &mut Distances, n| {
+        let mut points = Vec::new();
+        for brick in piece(n) {
+            if placement == Placement::Centre {
+                middles(touched, brick, &mut points);
+            } else {
+                distances.fill(octree, touched, brick);
+                distances.start(touched, brick, &mut points);
+            }
+        }
+        points
+    };
+    let append = |of_bricks: Vec<DVec3>| {
+        points.extend_from_slice(&of_bricks);
+        Ok(())
+    };
+    in_order(count, &Silent, Distances::new, of_bricks, append).expect("nothing fails or is cancelled");
     if placement == Placement::Centre {
-        for_bricks(touched, &mut points[ring..], || (), |(), brick, points| middles(touched, brick, points));
         return points;
     }
-    for_bricks(touched, &mut points[ring..], Distances::new, |distances, brick, points| {
-        distances.fill(octree, touched, brick);
-        distances.start(touched, brick, points);
-    });
-    let (count, piece) = touched.pieces();
     // The last piece that has a brick beside those of each.
     let askers: Vec<usize> = (0..count)
         .into_par_iter()
@@ -69,7 +86,7 @@ const WAVE: usize = 64;
 
 /// One round. All vertices move at once: the new positions of a piece wait until the last piece that asks for the old ones has moved. Along
 /// the Z-order few of them wait at a time.
-fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut [DVec3]) {
+fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut Points) {
     let (count, piece) = touched.pieces();
     let mut waiting: Vec<(usize, Vec<DVec3>)> = Vec::new();
     for wave in (0..count).step_by(WAVE) {
@@ -80,7 +97,7 @@ fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: us
             let is_asked = askers[*n] >= end;
             if !is_asked {
                 let first = ring + touched.first_of(piece(*n).start) as usize;
-                points[first..first + moved.len()].copy_from_slice(moved);
+                (first..).zip(moved).for_each(|(i, &point)| points[i] = point);
             }
             is_asked
         });
@@ -88,20 +105,14 @@ fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: us
 }
 
 /// Where the vertices of some bricks go in a round.
-fn moved(
-    touched: &Touched,
-    neighbours: &Neighbours,
-    ring: usize,
-    points: &[DVec3],
-    bricks: Range<usize>,
-) -> Vec<DVec3> {
+fn moved(touched: &Touched, neighbours: &Neighbours, ring: usize, points: &Points, bricks: Range<usize>) -> Vec<DVec3> {
     let mut moved = Vec::with_capacity((touched.first_of(bricks.end) - touched.first_of(bricks.start)) as usize);
     for (cell, at) in touched.bricks[bricks].iter().flat_map(TouchedBrick::cells) {
         let TouchedCell { first, shape, .. } = touched.cells[cell];
         let origin = DVec3::from(at.map(f64::from));
         for (i, [low, high]) in (first as usize..).zip(&touched.shapes[usize::from(shape)].ranges) {
-            let around = neighbours.of(i);
-            let mean = around.iter().map(|&n| points[n as usize]).sum::<DVec3>() / around.len() as f64;
+            let number = neighbours.places(i).len() as f64;
+            let mean = neighbours.of(i).map(|n| points[n as usize]).sum::<DVec3>() / number;
             let to = points[ring + i].lerp(mean, STEP).clamp(origin + *low, origin + *high);
             moved.push(touched.in_root(to));
         }
@@ -109,37 +120,12 @@ fn moved(
     moved
 }
 
-/// Calls `each` for all bricks, in parallel, with the places for the results of the brick's vertices.
-fn for_bricks<S>(
-    touched: &Touched,
-    mut points: &mut [DVec3],
-    init: impl Fn() -> S + Sync + Send,
-    each: impl Fn(&mut S, usize, &mut [DVec3]) + Sync + Send,
-) {
-    let (count, piece) = touched.pieces();
-    let mut pieces = Vec::with_capacity(count);
-    for n in 0..count {
-        let vertices = touched.first_of(piece(n).end) - touched.first_of(piece(n).start);
-        let (of_piece, rest) = points.split_at_mut(vertices as usize);
-        pieces.push((n, of_piece));
-        points = rest;
-    }
-    pieces.into_par_iter().for_each_init(init, |state, (n, mut points)| {
-        for brick in piece(n) {
-            let vertices = touched.first_of(brick + 1) - touched.first_of(brick);
-            let (of_brick, rest) = points.split_at_mut(vertices as usize);
-            each(state, brick, of_brick);
-            points = rest;
-        }
-    });
-}
-
 /// The neighbours of each vertex of a touched cell, in the order of the polygons: first the vertices of the ring, then those of touched
 /// cells.
 pub(super) struct Neighbours {
     /// For each vertex where the list of its neighbours ends.
     ends: Vec<u32>,
-    list: Vec<u32>,
+    list: Segments<u32, 14>,
 }
 
 impl Neighbours {
@@ -155,7 +141,7 @@ impl Neighbours {
             // Where it begins, for now: it moves on to the end as the list is filled.
             sum += std::mem::replace(end, sum);
         }
-        let mut list = vec![0; sum as usize];
+        let mut list = Segments::filled(0, sum as usize);
         for (from, to) in sides() {
             let number = match to.checked_sub(kept) {
                 Some(touched) => ring.len() as u32 + touched,
@@ -167,23 +153,27 @@ impl Neighbours {
         Neighbours { ends, list }
     }
 
+    /// Where the neighbours of a vertex stand in the list.
     #[inline]
-    fn of(&self, i: usize) -> &[u32] {
+    fn places(&self, i: usize) -> Range<usize> {
         let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        &self.list[start as usize..self.ends[i] as usize]
+        start as usize..self.ends[i] as usize
+    }
+
+    #[inline]
+    fn of(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
+        self.places(i).map(|place| self.list[place])
     }
 }
 
-/// The middles of the octants of each vertex of the cells of a brick, or of the cell if it has only one.
-fn middles(touched: &Touched, brick: usize, points: &mut [DVec3]) {
-    let mut points = points.iter_mut();
+/// Appends the middles of the octants of each vertex of the cells of a brick, or of the cell if it has only one.
+fn middles(touched: &Touched, brick: usize, points: &mut Vec<DVec3>) {
     for (cell, at) in touched.bricks[brick].cells() {
         let shape = touched.shape(touched.cells[cell]);
         for vertex in 0..shape.vertices {
             let middle =
                 if shape.vertices == 1 { DVec3::splat(0.5) } else { middle_of_octants(shape.corners_of(vertex)) };
-            *points.next().expect("as many as the cells have") =
-                touched.in_root(DVec3::from(at.map(f64::from)) + middle);
+            points.push(touched.in_root(DVec3::from(at.map(f64::from)) + middle));
         }
     }
 }
@@ -216,9 +206,8 @@ impl Distances {
             .fill(&Cells::new(octree, place as usize), |Crossing { number, .. }| position(offsets[number as usize]));
     }
 
-    /// The vertices of the cells of a brick before they are smoothed.
-    fn start(&self, touched: &Touched, brick: usize, points: &mut [DVec3]) {
-        let mut points = points.iter_mut();
+    /// Appends the vertices of the cells of a brick before they are smoothed.
+    fn start(&self, touched: &Touched, brick: usize, points: &mut Vec<DVec3>) {
         let brick = &touched.bricks[brick];
         for ((i, at), local) in brick.cells().zip(brick.plane.iter()) {
             let cell = touched.cells[i];
@@ -233,7 +222,7 @@ impl Distances {
                 let is_irregular = shape.irregular >> vertex & 1 == 1;
                 let start = if is_irregular { mean.lerp(middle(), 0.5) } else { mean };
                 let [low, high] = shape.ranges[usize::from(vertex)];
-                *points.next().expect("as many as the cells have") = touched.in_root(origin + start.clamp(low, high));
+                points.push(touched.in_root(origin + start.clamp(low, high)));
             }
         }
     }
