@@ -62,7 +62,7 @@ use super::dual::Placement;
 use crate::geom::qef::Qef;
 use crate::grid::cases::Mask;
 use crate::grid::{Axis, Corner};
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 
 /// Vertices keep this distance from the sides of their cell, in cells.
 const CELL_MARGIN: f32 = 1.0 / 1024.0;
@@ -97,6 +97,11 @@ pub(super) enum Beyond {
 /// Whether a sheet has a crease or corner.
 pub(super) fn is_creased(placement: Placement<'_>, sum: &Qef) -> bool {
     placement.needs_normals() && sum.flatness() < CREASED
+}
+
+/// The same, given the sum of the normals and their number.
+pub(super) fn are_creased(normals: Vec4) -> bool {
+    Qef::flatness_of(normals) < CREASED
 }
 
 /// Where the vertex of a sheet goes whose planes add up to `sum`, in a cell with the least corner `corner`; `beyond` tells what is at a

@@ -145,15 +145,26 @@ impl<'a> Layout<'a> {
 
     /// The brick of the mixed cell at `at`, its first vertex and its mask (0 if ordinary). Cost: a hash probe and a few counts.
     pub(super) fn find(&self, at: [u32; 3]) -> (usize, u32, Mask) {
+        let brick = self.brick_of(at);
+        let (first, mask) = self.find_in(brick, at);
+        (brick, first, mask)
+    }
+
+    /// The brick of the mixed cell at `at`. Cost: a hash probe.
+    pub(super) fn brick_of(&self, at: [u32; 3]) -> usize {
         let crossings = self.octree.crossings();
         let key = Key::cell(crossings.depth() - 3, at.map(|c| c >> 3)).expect("cells lie in the root cube");
-        let brick = crossings.find(key).expect("mixed cells belong to listed bricks");
+        crossings.find(key).expect("mixed cells belong to listed bricks")
+    }
+
+    /// The first vertex of the mixed cell at `at`, which lies in a brick, and its mask (0 if ordinary). Cost: a few counts.
+    pub(super) fn find_in(&self, brick: usize, at: [u32; 3]) -> (u32, Mask) {
         let cell = Local::new(at[0], at[1], at[2]);
         let knots = self.knots_of(brick);
         let extra: i32 = knots.iter().filter(|k| k.cell < cell).map(|&k| self.extra_vertices(k)).sum();
         let CellBrick { mixed, first, .. } = &self.bricks[brick];
         let mask = knots.iter().find(|k| k.cell == cell).map_or(0, |k| k.mask);
-        (brick, (first + mixed.rank(cell)).wrapping_add_signed(extra), mask)
+        ((first + mixed.rank(cell)).wrapping_add_signed(extra), mask)
     }
 
     /// The vertex of the cell at `at` to which its inside corner `corner` belongs.

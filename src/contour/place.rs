@@ -1,6 +1,6 @@
 //! Where the vertices of dual surfaces go: the planes of their cells, added up; [`crease`](super::crease) finds the point.
 
-use super::crease::{APART, Beyond, common_point, is_behind, is_creased, pierces, solve};
+use super::crease::{APART, Beyond, are_creased, common_point, is_behind, is_creased, pierces, solve};
 use super::dual::Placement;
 use super::layout::{Knot, Layout, Style};
 use crate::geom::normal::NormalCode;
@@ -11,7 +11,7 @@ use crate::grid::{Axis, Corner};
 use crate::octree::SignedOctree;
 use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::{Crossings, position};
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3A, Vec4};
 
 /// The tangent planes at the crossings round the cells of a brick, in cells from its least corner, and what they add up to for
 /// each cell.
@@ -20,6 +20,10 @@ pub(super) struct Planes {
     tangents: EdgeTable<(Vec3A, Vec3A)>,
     /// For each cell, and those round the brick, whose sums are never read. Cells without crossings have empty sums.
     sums: Box<[Qef; SUM_SIDE.pow(3)]>,
+    /// The same where the points are given, and normals only tell of creases: their sum, and their number.
+    normals: Box<[Vec4; SUM_SIDE.pow(3)]>,
+    /// Whether these are in use.
+    only_normals: bool,
 }
 
 /// Cells a side of the table of sums: a brick and a layer on both sides.
@@ -34,7 +38,12 @@ const ROUND_EDGE: [[usize; 4]; 3] = {
 
 impl Planes {
     pub(super) fn new() -> Self {
-        Planes { tangents: EdgeTable::new((Vec3A::ZERO, Vec3A::ZERO)), sums: Box::new([Qef::EMPTY; SUM_SIDE.pow(3)]) }
+        Planes {
+            tangents: EdgeTable::new((Vec3A::ZERO, Vec3A::ZERO)),
+            sums: Box::new([Qef::EMPTY; SUM_SIDE.pow(3)]),
+            normals: Box::new([Vec4::ZERO; SUM_SIDE.pow(3)]),
+            only_normals: false,
+        }
     }
 
     fn sum_at([x, y, z]: [u32; 3]) -> usize {
@@ -52,11 +61,17 @@ impl Planes {
         mut place: impl FnMut(Local, Vec3A),
     ) -> Plane {
         let cells = Cells::new(layout.octree, brick);
+        let mixed = layout.mixed(brick);
+        self.only_normals = match placement {
+            Placement::Given { points, .. } => {
+                points.of_brick(cells.brick().key).is_some_and(|points| (mixed & !*points.cells()).is_empty())
+            }
+            _ => false,
+        };
         if placement != Placement::Centre {
             self.fill(&cells, layout.octree.crossings(), placement);
         }
         let given = given(layout.octree, brick, placement);
-        let mixed = layout.mixed(brick);
         let origin = layout.octree.crossings().origin(cells.brick());
         let side = 1 << layout.octree.crossings().depth();
         let beyond = |cell: Local, p: Vec3A| {
@@ -101,6 +116,7 @@ impl Planes {
         mut place: impl FnMut(Vec3A),
     ) {
         let cells = Cells::new(octree, brick);
+        self.only_normals = false;
         self.fill(&cells, octree.crossings(), placement);
         let given = given(octree, brick, placement);
         cells
@@ -110,8 +126,8 @@ impl Planes {
     }
 
     fn fill(&mut self, cells: &Cells<'_>, crossings: &Crossings, placement: Placement<'_>) {
-        let sums = &mut self.sums;
-        self.tangents.fill(cells, |Crossing { axis, start, number, starts_inside }| {
+        let Planes { tangents, sums, normals, only_normals } = self;
+        tangents.fill(cells, |Crossing { axis, start, number, starts_inside }| {
             let offset = position(crossings.offsets()[number as usize]) as f32;
             let point = Vec3A::from(start.map(|c| c as f32)) + offset * Vec3A::AXES[axis.index()];
             let normal = match placement {
@@ -122,9 +138,14 @@ impl Planes {
             };
             // Decoded normals point to the high end of the edge.
             let normal = if starts_inside { normal } else { -normal };
-            let plane = Qef::of_plane(point, normal);
             let last = Self::sum_at(start);
-            ROUND_EDGE[axis.index()].iter().for_each(|step| sums[last - step] += &plane);
+            if *only_normals {
+                let normal = Vec4::from((normal, 1.0));
+                ROUND_EDGE[axis.index()].iter().for_each(|step| normals[last - step] += normal);
+            } else {
+                let plane = Qef::of_plane(point, normal);
+                ROUND_EDGE[axis.index()].iter().for_each(|step| sums[last - step] += &plane);
+            }
             (point, normal)
         });
     }
@@ -132,6 +153,11 @@ impl Planes {
     /// The sum for a cell, which is empty from then on.
     fn take_sum(&mut self, cell: Local) -> Qef {
         std::mem::replace(&mut self.sums[Self::sum_at(cell.coords())], Qef::EMPTY)
+    }
+
+    /// The same of the normals.
+    fn take_normals(&mut self, cell: Local) -> Vec4 {
+        std::mem::replace(&mut self.normals[Self::sum_at(cell.coords())], Vec4::ZERO)
     }
 
     /// Calls `place` with the vertex of a cell that has one, in cells from the least corner of its brick; `beyond` tells what is at a
@@ -149,6 +175,10 @@ impl Planes {
             place(least_corner(cell) + 0.5);
             return false;
         }
+        if self.only_normals {
+            place(given.expect("all mixed cells of the brick have points"));
+            return are_creased(self.take_normals(cell));
+        }
         let sum = self.take_sum(cell);
         place(given.unwrap_or_else(|| solve(least_corner(cell), placement, &sum, beyond)));
         is_creased(placement, &sum)
@@ -157,6 +187,7 @@ impl Planes {
     /// Leaves out a cell with several sheets. Returns that it has no crease.
     fn skip_knot(&mut self, cell: Local) -> bool {
         self.take_sum(cell);
+        self.take_normals(cell);
         false
     }
 
@@ -170,6 +201,7 @@ impl Planes {
         mut place: impl FnMut(Vec3A),
     ) -> bool {
         let whole = self.take_sum(cell);
+        self.take_normals(cell);
         let case = &CASES[usize::from(mask)];
         if placement == Placement::Centre {
             for vertex in 0..case.sheets.vertices {

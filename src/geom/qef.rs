@@ -51,7 +51,14 @@ impl Qef {
     #[inline]
     pub fn flatness(&self) -> f32 {
         let [x, y, z] = self.rows.map(|row| row.w);
-        (x * x + y * y + z * z) / (self.points.w * self.points.w)
+        Qef::flatness_of(Vec4::new(x, y, z, self.points.w))
+    }
+
+    /// The same, given the sum of the normals and their number.
+    #[inline]
+    pub fn flatness_of(normals: Vec4) -> f32 {
+        let [x, y, z, number] = normals.to_array();
+        (x * x + y * y + z * z) / (number * number)
     }
 
     /// Mean of the squared distances of a point from the planes. There must be at least one. Rounding: 1e-5 for coordinates up to 8.

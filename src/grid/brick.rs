@@ -8,6 +8,7 @@
 //! eight word operations. All methods cost a few operations per word (eight words) and allocate nothing.
 
 use super::Axis;
+use super::key::{deinterleave, interleave};
 use std::ops::{BitAnd, BitAndAssign, BitOr, BitOrAssign, BitXor, BitXorAssign, Not};
 
 /// Cells a side of a brick.
@@ -36,6 +37,39 @@ impl Local {
     /// The coordinates, each 0..8.
     pub const fn coords(self) -> [u32; 3] {
         [self.0 as u32 >> 6, self.0 as u32 >> 3 & 7, self.0 as u32 & 7]
+    }
+
+    /// The position with this place in the Z-order of the brick; only the nine lowest bits count.
+    #[inline]
+    pub const fn from_order(order: u64) -> Self {
+        /// By place in the Z-order.
+        static POSITIONS: [Local; 512] = {
+            let mut all = [Local(0); 512];
+            let mut i = 0;
+            while i < 512 {
+                let [x, y, z] = deinterleave(i);
+                all[i as usize] = Local::new(x, y, z);
+                i += 1;
+            }
+            all
+        };
+        POSITIONS[(order & 511) as usize]
+    }
+
+    /// Its place in the Z-order of the brick.
+    #[inline]
+    pub const fn order(self) -> u64 {
+        /// By index.
+        static ORDERS: [u16; 512] = {
+            let mut all = [0; 512];
+            let mut i = 0;
+            while i < 512 {
+                all[i] = interleave(Local(i as u16).coords()) as u16;
+                i += 1;
+            }
+            all
+        };
+        ORDERS[self.0 as usize & 511] as u64
     }
 
     const fn word(self) -> usize {
@@ -448,6 +482,7 @@ mod tests {
             let p = Local::from_index(i);
             let [x, y, z] = p.coords();
             assert_eq!(Local::new(x, y, z), p);
+            assert_eq!((Local::from_order(p.order()), p.order()), (p, interleave([x, y, z])));
             let mut plane = Plane::EMPTY;
             plane.toggle(p);
             assert_eq!(plane.touches_min_x(), x == 0);

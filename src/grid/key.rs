@@ -223,7 +223,7 @@ impl Key {
     }
 
     /// The interleaved smallest corner: the centre without its lowest bit on the extended axes.
-    const fn min_code(self) -> u64 {
+    pub(crate) const fn min_code(self) -> u64 {
         if self.is_point() {
             return self.code();
         }
@@ -285,6 +285,12 @@ impl Key {
     pub(crate) const fn code_inside(self, corner: Corner) -> u64 {
         let below = 8 * self.lowest() - 1;
         self.min_code() | FIELDS[corner.bits() as usize] & below
+    }
+
+    /// The element of a level with this extent whose least corner has the code `start`, which lies in the root and on the level's grid.
+    pub(crate) const fn starting_at(start: u64, extent: Extent, level: u32) -> Key {
+        let half = 7 << (3 * (MAX_LEVEL - level));
+        Key((extent.bits() as u64) << EXTENT_SHIFT | start | FIELDS[extent.bits() as usize] & half)
     }
 
     /// The smallest cell that holds both. Domain: cells.

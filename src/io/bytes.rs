@@ -67,7 +67,18 @@ impl<'a, R: Read> Bytes<'a, R> {
     }
 
     /// Takes as many bytes as the array has, or `None` when fewer are left.
+    #[inline]
     pub(super) fn take<const N: usize>(&mut self) -> Result<Option<[u8; N]>> {
+        if let Some(&taken) = self.buffer[self.window.clone()].first_chunk() {
+            self.consume(N);
+            return Ok(Some(taken));
+        }
+        self.fill_and_take()
+    }
+
+    /// The same if the buffer has too few.
+    #[cold]
+    fn fill_and_take<const N: usize>(&mut self) -> Result<Option<[u8; N]>> {
         let taken = self.fill(N)?.first_chunk().copied();
         self.consume(if taken.is_some() { N } else { 0 });
         Ok(taken)

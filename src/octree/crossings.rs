@@ -133,14 +133,22 @@ pub fn finest_element(depth: u32, at: [u32; 3], extent: Extent) -> Key {
 
 /// The lattice point, in cells, at which a finest element starts.
 pub fn lattice_point(depth: u32, element: Key) -> [u32; 3] {
-    element.min_corner().map(|c| c / (SIDE >> depth))
+    let finest = SIDE.ilog2() - depth;
+    element.min_corner().map(|c| c >> finest)
 }
 
 /// The brick that owns a finest element, which is the one that holds its start, and the element's position in it. No brick owns what
 /// starts on the root's high faces.
 pub fn owner(depth: u32, element: Key) -> (Option<Key>, Local) {
-    let at = lattice_point(depth, element);
-    (Key::cell(depth - 3, at.map(|c| c >> 3)), Local::new(at[0], at[1], at[2]))
+    let start = element.min_code();
+    let in_root = start >> (3 * SIDE.ilog2()) == 0;
+    let order = start >> (3 * (SIDE.ilog2() - depth));
+    (in_root.then(|| Key::around(start, depth - 3)), Local::from_order(order))
+}
+
+/// The finest element that a brick owns at a position: the inverse of [`owner`]. Any cell three levels above the finest will do.
+pub fn owned(depth: u32, brick: Key, local: Local, extent: Extent) -> Key {
+    Key::starting_at(brick.min_code() | local.order() << (3 * (SIDE.ilog2() - depth)), extent, depth)
 }
 
 /// Whether so many crossings can be numbered: places in the arrays have 32 bits.

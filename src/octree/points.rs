@@ -87,6 +87,11 @@ impl PointsOfBrick<'_> {
         cells.get(cell).then(|| self.points[first + cells.rank(cell) as usize])
     }
 
+    /// The cells that have a point.
+    pub(crate) fn cells(&self) -> &Plane {
+        &self.brick.cells
+    }
+
     /// Calls `each` with the cells among those of `select`, a word of bits for each x, that have a point, and with the points.
     pub(crate) fn for_selected(&self, select: impl Fn(usize) -> u64, mut each: impl FnMut(Local, [f32; 3])) {
         let mut before = self.brick.first;

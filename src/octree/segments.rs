@@ -122,6 +122,17 @@ impl<T: Copy> Reader<T> {
 }
 
 impl<T: Copy, const BITS: u32> Segments<T, BITS> {
+    /// So many times the same element.
+    pub fn filled(element: T, len: usize) -> Self {
+        let sizes = (0..len.div_ceil(Self::SIZE)).map(|i| (len - i * Self::SIZE).min(Self::SIZE));
+        Segments { segments: sizes.map(|size| vec![element; size]).collect(), len }
+    }
+
+    /// The segments, in order.
+    pub fn parts(&self) -> impl Iterator<Item = &[T]> {
+        self.segments.iter().map(Vec::as_slice)
+    }
+
     /// The elements, to be read piece by piece.
     pub fn into_reader(self) -> Reader<T> {
         Reader { segments: self.segments.into_iter(), current: Vec::new(), at: 0 }
@@ -182,6 +193,11 @@ mod tests {
             assert_eq!(*list.slice(at..at + count), part);
             at += part.len();
         }
+        assert!(list.parts().flatten().eq(list.iter()));
         assert!(list.into_iter().skip(78).eq(plain[78..].iter().copied()));
+        for len in [0, 15, 16, 17, 100] {
+            let list = Segments::<u8, 4>::filled(7, len);
+            assert!(list.len() == len && list.iter().eq(&vec![7; len]));
+        }
     }
 }

@@ -1,12 +1,14 @@
 //! The three Betti numbers of a solid: components, handles, cavities.
 //!
 //! Components are counted on the object, cavities on the background (all its components but the one with the sentinel, by Alexander
-//! duality), and handles follow from the Euler number: b0 - b1 + b2. No thinning is needed. Cost: some 5 us a brick.
+//! duality), and handles follow from the Euler number: b0 - b1 + b2. No thinning is needed. Where nothing is edited, signs tell components
+//! and cavities ([`Components`]): elements hang together as their points do. Cost: some 5 us a brick, half of that without edits.
 
 use super::complex::{Complex, Side};
 use super::label::Labels;
 use crate::grid::{Axis, Extent};
 use crate::octree::EditedOctree;
+use crate::octree::components::Components;
 use std::fmt;
 
 /// How many pieces, handles and cavities a solid has.
@@ -23,8 +25,13 @@ pub struct Betti {
 impl Betti {
     /// Counts them.
     pub fn of(octree: &EditedOctree) -> Betti {
-        let components = components(&Complex::new(octree, Side::Object));
-        let cavities = components_of_background(octree);
+        let (components, cavities) = if octree.is_edited() {
+            let of = |side| components(&Complex::new(octree, side));
+            (of(Side::Object), of(Side::Background))
+        } else {
+            let components = Components::new(octree.signed());
+            (components.solids().count() as u64, components.cavities().count() as u64)
+        };
         let handles = components as i64 + cavities as i64 - octree.euler_number();
         debug_assert!(handles >= 0, "Betti numbers are not negative");
         Betti { components, handles: handles as u64, cavities }
@@ -59,10 +66,6 @@ fn components(complex: &Complex) -> u64 {
     Labels::new(complex, |brick| edges(complex, brick)).sets().len() as u64
 }
 
-fn components_of_background(octree: &EditedOctree) -> u64 {
-    components(&Complex::new(octree, Side::Background))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,6 +78,8 @@ mod tests {
         let edited = EditedOctree::unedited(octree);
         let [components, handles, cavities] = betti(&elements(&edited)).map(|n| n as u64);
         assert_eq!(Betti::of(&edited), Betti { components, handles, cavities });
+        let of = |side| super::components(&Complex::new(&edited, side));
+        assert_eq!((components, cavities), (of(Side::Object), of(Side::Background)));
         for side in [Side::Object, Side::Background] {
             let mut complex = Complex::new(&edited, side);
             assert_eq!(complex.validate(), Ok(()));

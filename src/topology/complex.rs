@@ -34,7 +34,7 @@
 use crate::grid::brick::{Local, Plane};
 use crate::grid::key::SIDE;
 use crate::grid::{Axis, Extent, Face, Key};
-use crate::octree::crossings::{finest_element, lattice_point, owner};
+use crate::octree::crossings::{lattice_point, owned, owner};
 use crate::octree::{EditedOctree, LinearOctree};
 use rayon::prelude::*;
 
@@ -315,8 +315,7 @@ impl Complex {
             Side::Object => (spot.extent, spot.local),
             Side::Background => (!spot.extent, Local::from_index(511 - spot.local.index())),
         };
-        let [origin, at] = [lattice_point(self.depth, self.bricks[spot.brick as usize].key), local.coords()];
-        finest_element(self.depth, std::array::from_fn(|a| origin[a] + at[a]), extent)
+        owned(self.depth, self.bricks[spot.brick as usize].key, local, extent)
     }
 
     /// The centre of the element at a spot, in lattice units.

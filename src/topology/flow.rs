@@ -46,7 +46,7 @@ impl Flow {
                 return false;
             }
             self.first.push(self.steps.len() as u32);
-            sources(complex, from, |edge, changes_sign| {
+            sources(complex, from, &mut |edge, changes_sign| {
                 let to = self.enter(edge);
                 self.waiting[to as usize] += 1;
                 self.steps.push(to << 1 | u32::from(changes_sign));
@@ -141,29 +141,57 @@ fn in_table(edge: Spot) -> usize {
 
 /// Calls `visit` with each edge that flowed into another one through a face, and whether phi changes its sign there.
 #[inline]
-fn sources(complex: &Complex, edge: Spot, mut visit: impl FnMut(Spot, bool)) {
-    let along = edge.extent.axes().next().expect("an edge has an axis");
-    for side in Face::ALL.into_iter().filter(|side| side.axis() != along) {
-        // The face on the high side starts where the edge does.
-        let start =
-            if side.is_high() { Some((edge.brick, edge.local)) } else { complex.step(edge.brick, edge.local, side) };
-        let Some((brick, local)) = start else { continue };
-        let extent = edge.extent | side.axis();
-        let Some(partner) = partner_side(complex, Spot { brick, extent, local }) else { continue };
-        // Seen from the face, the edge lies on the opposite side.
-        let own = side.opposite();
-        if partner == own {
-            continue;
-        }
-        let end = if partner.is_high() { complex.step(brick, local, partner) } else { Some((brick, local)) };
-        let (brick, local) = end.expect("both were live, so their bricks are listed");
-        let source = Spot { brick, extent: extent - partner.axis(), local };
-        visit(source, runs_along(extent, own) == runs_along(extent, partner));
+fn sources(complex: &Complex, edge: Spot, visit: &mut impl FnMut(Spot, bool)) {
+    // X, Y, Z are bits 4, 2, 1. All that depends on axes and sides alone is worked out by the compiler.
+    match edge.extent.bits() {
+        4 => around::<0, 1, 2>(complex, edge, visit),
+        2 => around::<1, 0, 2>(complex, edge, visit),
+        _ => around::<2, 0, 1>(complex, edge, visit),
     }
 }
 
-/// The side of a face on which the edge lies with which it was removed.
+/// [`sources`] of an edge along axis `A`; `U` and `V` are the two others, ascending.
 #[inline]
+fn around<const A: usize, const U: usize, const V: usize>(
+    complex: &Complex,
+    edge: Spot,
+    visit: &mut impl FnMut(Spot, bool),
+) {
+    through::<A, U, false>(complex, edge, visit);
+    through::<A, U, true>(complex, edge, visit);
+    through::<A, V, false>(complex, edge, visit);
+    through::<A, V, true>(complex, edge, visit);
+}
+
+/// [`sources`] through the face on one side, along axis `U`, of an edge along axis `A`.
+#[inline]
+fn through<const A: usize, const U: usize, const HIGH: bool>(
+    complex: &Complex,
+    edge: Spot,
+    visit: &mut impl FnMut(Spot, bool),
+) {
+    let (along, across, normal) = (Axis::ALL[A], Axis::ALL[U], Axis::ALL[3 - A - U]);
+    let step = |brick, local, axis, high| complex.step(brick, local, Face::new(axis, high));
+    // The face on the high side starts where the edge does.
+    let start = if HIGH { Some((edge.brick, edge.local)) } else { step(edge.brick, edge.local, across, false) };
+    let Some((brick, local)) = start else { return };
+    let Some(record) = complex.bricks[brick as usize].record.as_deref() else { return };
+    let Some(partner) = record.edge_of(normal, local) else { return };
+    // Seen from the face, the edge lies on the opposite side.
+    let (own, high) = (Face::new(across, !HIGH), partner.is_high());
+    let lies_opposite = partner.axis() == across;
+    if lies_opposite && high != HIGH {
+        return;
+    }
+    let axis = if lies_opposite { across } else { along };
+    let end = if high { step(brick, local, axis, true) } else { Some((brick, local)) };
+    let (brick, local) = end.expect("both were live, so their bricks are listed");
+    let extent = Extent::from(if lies_opposite { along } else { across });
+    let face = along | across;
+    visit(Spot { brick, extent, local }, runs_along(face, own) == runs_along(face, Face::new(axis, high)));
+}
+
+/// The side of a face on which the edge lies with which it was removed.
 fn partner_side(complex: &Complex, face: Spot) -> Option<Face> {
     complex.bricks[face.brick as usize].record.as_deref()?.edge_of(normal(face.extent), face.local)
 }

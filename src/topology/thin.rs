@@ -194,40 +194,54 @@ impl Marks {
 
 /// Word `x` of the planes of all elements with exactly one coface, by extent; `low` are the low neighbours of the brick.
 ///
-/// Everything word by word, so that it stays in registers: some 150 operations a word.
+/// Everything word by word, so that it stays in registers: some 150 operations a word, and a few where nothing is left or all cells are.
 #[inline]
 fn once_covered(live: &Planes, low: [&Planes; 3], x: usize) -> [u64; 7] {
-    let here = |extent: Extent| live[extent.index()].0[x];
-    // Of the two cofaces along an axis: whether it is just one, and whether it is both.
-    let along = |upper: Extent, axis: Axis| {
-        let next = &low[axis.index()][upper.index()];
-        let (above, upper) = (here(upper), upper.index());
-        let below = match axis {
-            Axis::X => {
-                if x == 0 {
-                    next.0[7]
-                } else {
-                    live[upper].0[x - 1]
-                }
-            }
-            Axis::Y => above << 8 | next.0[x] >> 56,
-            Axis::Z => above << 1 & !Z0 | next.0[x] >> 7 & Z0,
-        };
-        (above ^ below, above & below)
-    };
     let mut marked = [0; 7];
-    let of = |axis: Axis| along(Extent::from(axis), axis);
+    if live.iter().fold(0, |any, plane| any | plane.0[x]) == 0 {
+        return marked;
+    }
+    let here = |extent: Extent| live[extent.index()].0[x];
+    let cells = Axis::ALL.map(|axis| along(live, low, x, Extent::CELL, axis).0);
+    for axis in Axis::ALL {
+        let face = !Extent::from(axis);
+        marked[face.index()] = here(face) & cells[axis.index()];
+    }
+    if here(Extent::CELL) == !0 {
+        // Every point that begins a cell begins two faces with each edge, and three edges.
+        return marked;
+    }
+    let of = |axis: Axis| along(live, low, x, Extent::from(axis), axis);
     let ((a, aa), (b, bb), (c, cc)) = (of(Axis::X), of(Axis::Y), of(Axis::Z));
     marked[Extent::POINT.index()] = here(Extent::POINT) & (a ^ b ^ c) & !(a & b & c | aa | bb | cc);
     for axis in Axis::ALL {
         let edge = Extent::from(axis);
         let [u, v] = axis.others();
-        let ((a, aa), (b, bb)) = (along(edge | u, u), along(edge | v, v));
+        let ((a, aa), (b, bb)) = (along(live, low, x, edge | u, u), along(live, low, x, edge | v, v));
         marked[edge.index()] = here(edge) & (a ^ b) & !(aa | bb);
-        let face = !edge;
-        marked[face.index()] = here(face) & along(Extent::CELL, axis).0;
     }
     marked
+}
+
+/// For word `x` of the elements that have `upper` beside them along an axis, on either side: those for which just one is there, and those for
+/// which both are.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "axis and extent are known where it is called: a few operations are left")]
+fn along(live: &Planes, low: [&Planes; 3], x: usize, upper: Extent, axis: Axis) -> (u64, u64) {
+    let next = &low[axis.index()][upper.index()];
+    let above = live[upper.index()].0[x];
+    let below = match axis {
+        Axis::X => {
+            if x == 0 {
+                next.0[7]
+            } else {
+                live[upper.index()].0[x - 1]
+            }
+        }
+        Axis::Y => above << 8 | next.0[x] >> 56,
+        Axis::Z => above << 1 & !Z0 | next.0[x] >> 7 & Z0,
+    };
+    (above ^ below, above & below)
 }
 
 /// Bits with z = 0 of a word of a plane.
@@ -339,29 +353,15 @@ impl Work {
                 (marked, next) => (marked.unwrap_or(&Plane::EMPTY), next.unwrap_or(&Plane::EMPTY)),
             };
             let (lower, upper) = (extent.index(), (extent | axis).index());
-            let (mut low, mut high) = (Plane::EMPTY, Plane::EMPTY);
-            for x in 0..8 {
-                let here = marked.0[x];
-                let further = match axis {
-                    Axis::X => {
-                        if x == 7 {
-                            next.0[0]
-                        } else {
-                            marked.0[x + 1]
-                        }
-                    }
-                    Axis::Y => here >> 8 | next.0[x] << 56,
-                    Axis::Z => here >> 1 & !(Z0 << 7) | (next.0[x] & Z0) << 7,
-                };
-                low.0[x] = here & live[upper].0[x];
-                high.0[x] = further & live[upper].0[x] & !here;
-            }
+            let there = live[upper];
+            let low = *marked & there;
+            let high = marked.at_plus(axis, next) & there & !*marked;
             let both = low | high;
             if both.is_empty() {
                 continue;
             }
             live[lower] &= !(low | high.at_minus(axis, &Plane::EMPTY));
-            live[upper] &= !both;
+            live[upper] = there & !both;
             *carry = high.high_layer(axis);
             self.lost |= lost(&both, extent | axis);
             if extent.dimension() > 0 {

@@ -36,11 +36,13 @@ pub(super) struct Around<'a> {
     /// The brick, in bricks.
     brick: At,
     entries: Box<[Entry; SIDE.pow(3)]>,
+    /// The places in the octree of the brick and those round it, as far as somebody has asked.
+    places: [u32; 27],
 }
 
 impl<'a> Around<'a> {
     pub(super) fn new(patch: &'a Patch<'a>) -> Self {
-        Around { patch, brick: [0; 3], entries: Box::new([EMPTY; SIDE.pow(3)]) }
+        Around { patch, brick: [0; 3], entries: Box::new([EMPTY; SIDE.pow(3)]), places: [UNTOUCHED; 27] }
     }
 
     /// Looks up all cells round a brick. Cost: 27 hash probes, 0.3 us for the table, and 2 ns a touched cell.
@@ -51,6 +53,7 @@ impl<'a> Around<'a> {
         let touched = self.patch.touched;
         self.brick = touched.bricks[brick].at;
         self.entries.fill(EMPTY);
+        self.places = [UNTOUCHED; 27];
         for (steps, place) in touched.around(brick) {
             let beside = &touched.bricks[place];
             let bits = Y[(steps[1] + 1) as usize] & Z[(steps[2] + 1) as usize];
@@ -101,7 +104,12 @@ impl<'a> Around<'a> {
         if cell.shape != FOUND {
             let steps = [index / STEP[0], index / STEP[1] % SIDE, index % SIDE];
             let at = std::array::from_fn(|a| (8 * self.brick[a] + steps[a] as i32 - 1) as u32);
-            let (_, first, mask) = layout.find(at);
+            let [x, y, z] = steps.map(|step| step.div_ceil(8));
+            let place = &mut self.places[9 * x + 3 * y + z];
+            if *place == UNTOUCHED {
+                *place = layout.brick_of(at) as u32;
+            }
+            let (first, mask) = layout.find_in(*place as usize, at);
             *cell = TouchedCell { first, shape: FOUND, signs: mask };
         }
         // Masks are kept for cells with several vertices only.

@@ -7,7 +7,7 @@
 
 use super::polygons::Polygons;
 use super::shapes::Shape;
-use super::touched::{Touched, TouchedCell};
+use super::touched::{Touched, TouchedBrick, TouchedCell};
 use crate::contour::Placement;
 use crate::grid::brick::{Bits, Local};
 use crate::grid::cases::Mask;
@@ -15,20 +15,25 @@ use crate::grid::{Axis, Corner, Edge};
 use crate::octree::SignedOctree;
 use crate::octree::cells::{Cells, Crossing, EdgeTable};
 use crate::octree::crossings::position;
+use crate::octree::segments::Segments;
+use crate::parallel::in_order;
+use crate::progress::Silent;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// How far from the solid's points the surface runs where edits made it, in cells: a gap between two points one cell apart and a membrane
 /// are half a cell thick, both.
 const DISTANCE: f64 = 0.25;
-/// Vertices keep this distance from the sides of their octants, in cells.
-const MARGIN: f64 = 1.0 / 64.0;
 /// Rounds of averaging. In slanted membranes and cuts through a torus the steps of the grid are gone after six; after twenty nothing is
 /// visibly different.
 const ROUNDS: usize = 6;
 /// How far a vertex goes to the mean of its neighbours in a round. All move at once: with 1, two neighbours would change places again and
 /// again.
 const STEP: f64 = 0.5;
+
+/// Positions, in segments: they grow into the room that topology repair leaves behind.
+pub(super) type Points = Segments<DVec3, 12>;
 
 /// The positions of the vertices of touched cells, in cells, appended to `fixed`, those of the ring. Cost: linear in vertices and their
 /// neighbours, in parallel.
@@ -37,20 +42,31 @@ pub(super) fn place(
     placement: Placement<'_>,
     touched: &Touched,
     neighbours: &Neighbours,
-    fixed: Vec<DVec3>,
-) -> Vec<DVec3> {
+    fixed: Points,
+) -> Points {
     let ring = fixed.len();
     let mut points = fixed;
-    points.resize(ring + touched.vertices as usize, DVec3::ZERO);
+    let (count, piece) = touched.pieces();
+    let of_bricks = |distances: &mut Distances, n| {
+        let mut points = Vec::new();
+        for brick in piece(n) {
+            if placement == Placement::Centre {
+                middles(touched, brick, &mut points);
+            } else {
+                distances.fill(octree, touched, brick);
+                distances.start(touched, brick, &mut points);
+            }
+        }
+        points
+    };
+    let append = |of_bricks: Vec<DVec3>| {
+        points.extend_from_slice(&of_bricks);
+        Ok(())
+    };
+    in_order(count, &Silent, Distances::new, of_bricks, append).expect("nothing fails or is cancelled");
     if placement == Placement::Centre {
-        for_bricks(touched, &mut points[ring..], || (), |(), brick, points| middles(touched, brick, points));
         return points;
     }
-    for_bricks(touched, &mut points[ring..], Distances::new, |distances, brick, points| {
-        distances.fill(octree, touched, brick);
-        distances.start(touched, brick, points);
-    });
-    let (count, piece) = touched.pieces();
     // The last piece that has a brick beside those of each.
     let askers: Vec<usize> = (0..count)
         .into_par_iter()
@@ -70,69 +86,38 @@ const WAVE: usize = 64;
 
 /// One round. All vertices move at once: the new positions of a piece wait until the last piece that asks for the old ones has moved. Along
 /// the Z-order few of them wait at a time.
-fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut [DVec3]) {
+fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut Points) {
     let (count, piece) = touched.pieces();
     let mut waiting: Vec<(usize, Vec<DVec3>)> = Vec::new();
     for wave in (0..count).step_by(WAVE) {
         let end = count.min(wave + WAVE);
-        let moved = |n| (n, piece(n).flat_map(|brick| moved(touched, neighbours, ring, points, brick)).collect());
+        let moved = |n| (n, moved(touched, neighbours, ring, points, piece(n)));
         waiting.par_extend((wave..end).into_par_iter().map(moved));
         waiting.retain(|(n, moved)| {
             let is_asked = askers[*n] >= end;
             if !is_asked {
                 let first = ring + touched.first_of(piece(*n).start) as usize;
-                points[first..first + moved.len()].copy_from_slice(moved);
+                (first..).zip(moved).for_each(|(i, &point)| points[i] = point);
             }
             is_asked
         });
     }
 }
 
-/// Where the vertices of a brick go in a round.
-fn moved<'a>(
-    touched: &'a Touched,
-    neighbours: &'a Neighbours,
-    ring: usize,
-    points: &'a [DVec3],
-    brick: usize,
-) -> impl Iterator<Item = DVec3> + 'a {
-    touched.bricks[brick].cells().flat_map(move |(cell, at)| {
-        let cell = touched.cells[cell];
-        let shape = touched.shape(cell);
+/// Where the vertices of some bricks go in a round.
+fn moved(touched: &Touched, neighbours: &Neighbours, ring: usize, points: &Points, bricks: Range<usize>) -> Vec<DVec3> {
+    let mut moved = Vec::with_capacity((touched.first_of(bricks.end) - touched.first_of(bricks.start)) as usize);
+    for (cell, at) in touched.bricks[bricks].iter().flat_map(TouchedBrick::cells) {
+        let TouchedCell { first, shape, .. } = touched.cells[cell];
         let origin = DVec3::from(at.map(f64::from));
-        (0..shape.vertices).map(move |vertex| {
-            let i = cell.first as usize + usize::from(vertex);
-            let around = neighbours.of(i);
-            let mean = around.iter().map(|&n| points[n as usize]).sum::<DVec3>() / around.len() as f64;
-            let [low, high] = range(shape, vertex).map(|end| origin + end);
-            touched.in_root(points[ring + i].lerp(mean, STEP).clamp(low, high))
-        })
-    })
-}
-
-/// Calls `each` for all bricks, in parallel, with the places for the results of the brick's vertices.
-fn for_bricks<S>(
-    touched: &Touched,
-    mut points: &mut [DVec3],
-    init: impl Fn() -> S + Sync + Send,
-    each: impl Fn(&mut S, usize, &mut [DVec3]) + Sync + Send,
-) {
-    let (count, piece) = touched.pieces();
-    let mut pieces = Vec::with_capacity(count);
-    for n in 0..count {
-        let vertices = touched.first_of(piece(n).end) - touched.first_of(piece(n).start);
-        let (of_piece, rest) = points.split_at_mut(vertices as usize);
-        pieces.push((n, of_piece));
-        points = rest;
-    }
-    pieces.into_par_iter().for_each_init(init, |state, (n, mut points)| {
-        for brick in piece(n) {
-            let vertices = touched.first_of(brick + 1) - touched.first_of(brick);
-            let (of_brick, rest) = points.split_at_mut(vertices as usize);
-            each(state, brick, of_brick);
-            points = rest;
+        for (i, [low, high]) in (first as usize..).zip(&touched.shapes[usize::from(shape)].ranges) {
+            let number = neighbours.places(i).len() as f64;
+            let mean = neighbours.of(i).map(|n| points[n as usize]).sum::<DVec3>() / number;
+            let to = points[ring + i].lerp(mean, STEP).clamp(origin + *low, origin + *high);
+            moved.push(touched.in_root(to));
         }
-    });
+    }
+    moved
 }
 
 /// The neighbours of each vertex of a touched cell, in the order of the polygons: first the vertices of the ring, then those of touched
@@ -140,7 +125,7 @@ fn for_bricks<S>(
 pub(super) struct Neighbours {
     /// For each vertex where the list of its neighbours ends.
     ends: Vec<u32>,
-    list: Vec<u32>,
+    list: Segments<u32, 14>,
 }
 
 impl Neighbours {
@@ -156,7 +141,7 @@ impl Neighbours {
             // Where it begins, for now: it moves on to the end as the list is filled.
             sum += std::mem::replace(end, sum);
         }
-        let mut list = vec![0; sum as usize];
+        let mut list = Segments::filled(0, sum as usize);
         for (from, to) in sides() {
             let number = match to.checked_sub(kept) {
                 Some(touched) => ring.len() as u32 + touched,
@@ -168,23 +153,27 @@ impl Neighbours {
         Neighbours { ends, list }
     }
 
+    /// Where the neighbours of a vertex stand in the list.
     #[inline]
-    fn of(&self, i: usize) -> &[u32] {
+    fn places(&self, i: usize) -> Range<usize> {
         let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        &self.list[start as usize..self.ends[i] as usize]
+        start as usize..self.ends[i] as usize
+    }
+
+    #[inline]
+    fn of(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
+        self.places(i).map(|place| self.list[place])
     }
 }
 
-/// The middles of the octants of each vertex of the cells of a brick, or of the cell if it has only one.
-fn middles(touched: &Touched, brick: usize, points: &mut [DVec3]) {
-    let mut points = points.iter_mut();
+/// Appends the middles of the octants of each vertex of the cells of a brick, or of the cell if it has only one.
+fn middles(touched: &Touched, brick: usize, points: &mut Vec<DVec3>) {
     for (cell, at) in touched.bricks[brick].cells() {
         let shape = touched.shape(touched.cells[cell]);
         for vertex in 0..shape.vertices {
             let middle =
                 if shape.vertices == 1 { DVec3::splat(0.5) } else { middle_of_octants(shape.corners_of(vertex)) };
-            *points.next().expect("as many as the cells have") =
-                touched.in_root(DVec3::from(at.map(f64::from)) + middle);
+            points.push(touched.in_root(DVec3::from(at.map(f64::from)) + middle));
         }
     }
 }
@@ -198,22 +187,6 @@ fn middle_of_octants(corners: Mask) -> DVec3 {
 /// Where a corner is in its cell.
 fn position_of(corner: Corner) -> DVec3 {
     DVec3::from(Axis::ALL.map(|a| f64::from(u8::from(corner & a))))
-}
-
-/// The corners on the low side of each axis.
-const LOW: [Mask; 3] = [0x0f, 0x33, 0x55];
-
-/// Where a vertex may go, from where its cell starts.
-#[inline]
-fn range(shape: &Shape, vertex: u8) -> [DVec3; 2] {
-    if shape.vertices == 1 {
-        return [DVec3::splat(MARGIN), DVec3::splat(1.0 - MARGIN)];
-    }
-    let corners = shape.corners_of(vertex);
-    [
-        DVec3::from(LOW.map(|side| if corners & side != 0 { MARGIN } else { 0.5 + MARGIN })),
-        DVec3::from(LOW.map(|side| if corners & !side != 0 { 1.0 - MARGIN } else { 0.5 - MARGIN })),
-    ]
 }
 
 /// How far along their edges the crossings of a brick are.
@@ -233,9 +206,8 @@ impl Distances {
             .fill(&Cells::new(octree, place as usize), |Crossing { number, .. }| position(offsets[number as usize]));
     }
 
-    /// The vertices of the cells of a brick before they are smoothed.
-    fn start(&self, touched: &Touched, brick: usize, points: &mut [DVec3]) {
-        let mut points = points.iter_mut();
+    /// Appends the vertices of the cells of a brick before they are smoothed.
+    fn start(&self, touched: &Touched, brick: usize, points: &mut Vec<DVec3>) {
         let brick = &touched.bricks[brick];
         for ((i, at), local) in brick.cells().zip(brick.plane.iter()) {
             let cell = touched.cells[i];
@@ -249,8 +221,8 @@ impl Distances {
                 let mean = if n == 0.0 { middle() } else { sum / n };
                 let is_irregular = shape.irregular >> vertex & 1 == 1;
                 let start = if is_irregular { mean.lerp(middle(), 0.5) } else { mean };
-                let [low, high] = range(shape, vertex);
-                *points.next().expect("as many as the cells have") = touched.in_root(origin + start.clamp(low, high));
+                let [low, high] = shape.ranges[usize::from(vertex)];
+                points.push(touched.in_root(origin + start.clamp(low, high)));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The unedited surface as it passes by, with holes where edits touch it, into which the patch is put.
 
-use super::place::{Neighbours, place};
+use super::place::{Neighbours, Points, place};
 use super::polygons::{Patch, Polygons};
 use crate::contour::DualOptions;
 use crate::error::Result;
@@ -24,7 +24,7 @@ pub(super) struct Seam<'a> {
     dropped: usize,
     /// The vertices of untouched cells that the patch uses, and their positions in cells as far as they have passed.
     ring: Vec<u32>,
-    fixed: Vec<DVec3>,
+    fixed: Points,
     /// Of the vertices of the patch; none once its points have been passed on.
     neighbours: Option<Neighbours>,
 }
@@ -43,8 +43,8 @@ impl<'a> Seam<'a> {
         ring.dedup();
         ring.shrink_to_fit();
         let neighbours = Some(Neighbours::new(&polygons, &ring, patch.kept, patch.touched.vertices));
-        let fixed = Vec::with_capacity(ring.len());
-        Seam { sink, octree, frame, patch, sizes, options, passed: 0, dropped: 0, ring, fixed, neighbours }
+        let (passed, dropped, fixed) = (0, 0, Points::default());
+        Seam { sink, octree, frame, patch, sizes, options, passed, dropped, ring, fixed, neighbours }
     }
 
     /// Passes on points of untouched cells, and keeps those of the ring.
@@ -63,10 +63,15 @@ impl<'a> Seam<'a> {
         let Some(neighbours) = self.neighbours.take() else { return Ok(()) };
         let fixed = std::mem::take(&mut self.fixed);
         let ring = fixed.len();
-        let mut points = place(self.octree, self.options.placement, self.patch.touched, &neighbours, fixed);
+        let points = place(self.octree, self.options.placement, self.patch.touched, &neighbours, fixed);
         drop(neighbours);
-        points.iter_mut().for_each(|p| *p = self.frame.to_model(*p));
-        self.sink.points(&points[ring..])
+        let mut skipped = 0;
+        points.parts().try_for_each(|part| {
+            let start = (ring - skipped).min(part.len());
+            skipped += start;
+            let in_model: Vec<DVec3> = part[start..].iter().map(|&point| self.frame.to_model(point)).collect();
+            self.sink.points(&in_model)
+        })
     }
 
     /// Passes on the faces of the patch, which are made once more: that costs less than to keep them.

@@ -6,6 +6,7 @@ use super::around::steps_in_table;
 use crate::grid::cases::Mask;
 use crate::grid::subcomplex::Subcomplex;
 use crate::grid::{Axis, Corner, Edge, Face};
+use glam::DVec3;
 use std::sync::LazyLock;
 
 /// Four octants round an element of dimension 0, 1 or 2 in the complex and one of a dimension more that is not, counter-clockwise seen
@@ -28,6 +29,8 @@ pub(super) struct Shape {
     pub(super) open: [Mask; 3],
     /// The corners in the complex.
     pub(super) corners: Mask,
+    /// For each vertex the box that it may be in, from where the cell starts.
+    pub(super) ranges: Vec<[DVec3; 2]>,
     /// The polygons at its octants, in order: places in [`RINGS`].
     pub(super) rings: Vec<u8>,
 }
@@ -55,6 +58,12 @@ pub(super) static RINGS: LazyLock<Vec<Ring>> = LazyLock::new(|| {
     all.map(|ring| ring.map(|(steps, corner)| (steps_in_table(steps), corner))).collect()
 });
 
+/// Vertices keep this distance from the sides of their octants, in cells.
+const MARGIN: f64 = 1.0 / 64.0;
+
+/// The corners on the low side of each axis.
+const LOW: [Mask; 3] = [0x0f, 0x33, 0x55];
+
 /// Where the groups of [`RINGS`] begin.
 const TURNED: usize = 24;
 const BESIDE: usize = 48;
@@ -73,12 +82,26 @@ impl Shape {
             irregular: irregular.fold(0, |bits, c| bits | 1 << sheets.vertex[c.index()]),
             open: Axis::ALL.map(|axis| mask(&mut there().filter(|&c| !parts.contains(Edge::at(axis, c))))),
             corners: mask(&mut there()),
+            ranges: Vec::new(),
             rings: Vec::new(),
         };
+        shape.ranges = (0..shape.vertices).map(|vertex| shape.range(vertex)).collect();
         if shape.vertices > 0 {
             shape.rings = shape.rings_of(parts);
         }
         shape
+    }
+
+    /// Where a vertex may go, from where its cell starts.
+    fn range(&self, vertex: u8) -> [DVec3; 2] {
+        if self.vertices == 1 {
+            return [DVec3::splat(MARGIN), DVec3::splat(1.0 - MARGIN)];
+        }
+        let corners = self.corners_of(vertex);
+        [
+            DVec3::from(LOW.map(|side| if corners & side != 0 { MARGIN } else { 0.5 + MARGIN })),
+            DVec3::from(LOW.map(|side| if corners & !side != 0 { 1.0 - MARGIN } else { 0.5 - MARGIN })),
+        ]
     }
 
     fn rings_of(&self, parts: Subcomplex) -> Vec<u8> {

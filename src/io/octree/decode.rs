@@ -9,12 +9,13 @@
 use super::OctreeInfo;
 use super::coarse::MOST_CELLS;
 use super::dialect::{Dialect, Header, Node};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::brick::{Local, Plane};
-use crate::grid::key::{SIDE, deinterleave};
-use crate::grid::{Corner, Key};
+use crate::grid::key::SIDE;
+use crate::grid::{Corner, Extent, Key};
 use crate::io::bytes::Bytes;
 use crate::octree::cells::transposed;
+use crate::octree::crossings::owned;
 use crate::progress::{Progress, Stage, check};
 use std::io::Read;
 
@@ -93,24 +94,28 @@ pub(super) fn decode<D: Dialect, R: Read>(
         },
         brick: None,
         leaves: Plane::EMPTY,
+        filled: Plane::EMPTY,
         inside: [0; 512],
         has_coarse: false,
+        divided: 0,
         data: Box::new([D::Leaf::default(); 512]),
         keep,
     };
-    let mut next = Some(root);
-    let (mut nodes, mut coarse) = (0u64, 0u64);
+    let (mut next, mut nodes, mut looked) = (Some(root), 0u64, 0);
     while let Some(cell) = next {
         nodes += 1;
-        if nodes.is_multiple_of(OFTEN) {
+        if nodes >= looked + OFTEN {
+            looked = nodes;
             check(progress)?;
             progress.advance(bytes.position() - told);
             told = bytes.position();
         }
         let is_finest = cell.level() == Some(depth);
         next = match D::read_node(bytes)? {
-            Node::Inner if is_finest => {
-                return Err(bytes.error("a cell of the finest level is divided", "the file is damaged"));
+            Node::Inner if is_finest => return Err(divided(bytes)),
+            Node::Inner if cell.level() == Some(depth - 3) => {
+                nodes += decoder.nodes_of_brick(bytes, cell, info)?;
+                after(cell, root)
             }
             Node::Inner => Some(cell.child(Corner::MIN)),
             Node::Empty { is_outside } => {
@@ -119,23 +124,11 @@ pub(super) fn decode<D: Dialect, R: Read>(
                 after(cell, root)
             }
             Node::Leaf { outside, data } => {
-                info.surface_cells += 1;
-                match outside {
-                    0 => info.surface_cells_inside += 1,
-                    255 => info.surface_cells_outside += 1,
-                    _ => {}
-                }
+                count_leaf(info, outside);
                 if is_finest {
                     decoder.leaf(cell, !outside, data);
-                } else if [0, 255].contains(&outside) {
-                    decoder.empty(cell, outside == 0);
                 } else {
-                    coarse += 1 << (3 * (depth - cell.level().expect("cells have levels")));
-                    if coarse > MOST_CELLS {
-                        let problem = "surface cells above the finest level would be divided into too many";
-                        return Err(bytes.error(problem, "write the octree with surface cells at the finest level"));
-                    }
-                    decoder.coarse(cell, !outside);
+                    decoder.large(bytes, cell, !outside)?;
                 }
                 after(cell, root)
             }
@@ -144,6 +137,18 @@ pub(super) fn decode<D: Dialect, R: Read>(
     decoder.finish_brick();
     progress.advance(bytes.position() - told);
     Ok(decoder.made)
+}
+
+/// The error for a finest cell that is an inner node.
+#[cold]
+fn divided<R: Read>(bytes: &Bytes<'_, R>) -> Error {
+    bytes.error("a cell of the finest level is divided", "the file is damaged")
+}
+
+fn count_leaf(info: &mut OctreeInfo, outside: u8) {
+    info.surface_cells += 1;
+    info.surface_cells_inside += u64::from(outside == 0);
+    info.surface_cells_outside += u64::from(outside == 255);
 }
 
 /// The cell after `cell` and all it holds, in a walk over `root`.
@@ -161,19 +166,8 @@ fn after(mut cell: Key, root: Key) -> Option<Key> {
 /// Where in its brick a cell lies.
 #[inline]
 fn at(depth: u32, cell: Key) -> Local {
-    /// The position of the least corner by its place in the Z-order of the brick.
-    static BY_ORDER: [Local; 512] = {
-        let mut all = [Local::new(0, 0, 0); 512];
-        let mut i = 0;
-        while i < 512 {
-            let [x, y, z] = deinterleave(i);
-            all[i as usize] = Local::new(x, y, z);
-            i += 1;
-        }
-        all
-    };
     let finest = SIDE.ilog2() - depth;
-    BY_ORDER[(cell.code_inside(Corner::MIN) >> (3 * finest) & 511) as usize]
+    Local::from_order(cell.code_inside(Corner::MIN) >> (3 * finest))
 }
 
 /// Adds the corners of leaves that are inside to the planes of a brick: a row of eight cells is a matrix of 8 x 8 bits, transposed.
@@ -196,10 +190,14 @@ struct Decoder<'a, 'k, D: Dialect> {
     brick: Option<Divided>,
     /// Its leaves at the finest level.
     leaves: Plane,
+    /// Its cells that are inside as a whole.
+    filled: Plane,
     /// For each of them the corners that are inside; stale for other cells.
     inside: [u8; 512],
     /// Whether it holds cells that are to be divided.
     has_coarse: bool,
+    /// Finest cells that come of dividing larger ones.
+    divided: u64,
     /// What they say; stale for other cells.
     data: Box<[D::Leaf; 512]>,
     keep: &'a mut Keep<'k, D::Leaf>,
@@ -215,11 +213,70 @@ impl<D: Dialect> Decoder<'_, '_, D> {
             self.made.uniform.push((cell, is_inside));
             return;
         }
-        let (brick, at) = self.brick_around(cell);
+        let at = self.brick_around(cell);
         if is_inside {
-            let cube = Plane::cube(at, 1 << (depth - level));
-            brick.corners.iter_mut().for_each(|plane| *plane |= cube);
+            self.fill(at, 1 << (3 * (depth - level)));
         }
+    }
+
+    /// Takes as many cells of the brick that is being read, a cube, as inside.
+    fn fill(&mut self, at: Local, cells: u32) {
+        self.filled |= Plane::cube(at, 1 << (cells.ilog2() / 3));
+    }
+
+    /// Takes the nodes inside of a brick, which come in its Z-order, and returns how many there are.
+    fn nodes_of_brick<R: Read>(&mut self, bytes: &mut Bytes<'_, R>, key: Key, info: &mut OctreeInfo) -> Result<u64> {
+        let depth = self.made.depth;
+        self.begin_brick(key);
+        let mut nodes = 0;
+        // The place of the next node in the order, and how many finest cells it has.
+        let (mut place, mut cells) = (0u32, 64u32);
+        while place < 512 {
+            nodes += 1;
+            let at = Local::from_order(place.into());
+            match D::read_node(bytes)? {
+                Node::Inner if cells == 1 => return Err(divided(bytes)),
+                Node::Inner => {
+                    cells /= 8;
+                    continue;
+                }
+                Node::Empty { is_outside } => {
+                    info.empty_cells += 1;
+                    if !is_outside {
+                        self.fill(at, cells);
+                    }
+                }
+                Node::Leaf { outside, data } => {
+                    count_leaf(info, outside);
+                    if cells == 1 {
+                        self.put_leaf(at, !outside, data);
+                    } else {
+                        let brick = owned(depth, key, at, Extent::CELL);
+                        self.large(bytes, brick.ancestor(depth - cells.ilog2() / 3), !outside)?;
+                    }
+                }
+            }
+            place += cells;
+            while cells < 64 && place.is_multiple_of(8 * cells) {
+                cells *= 8;
+            }
+        }
+        Ok(nodes)
+    }
+
+    /// Takes a surface cell above the finest level; `inside` has a bit for each corner.
+    fn large<R: Read>(&mut self, bytes: &Bytes<'_, R>, cell: Key, inside: u8) -> Result<()> {
+        if [0, 255].contains(&inside) {
+            self.empty(cell, inside == 255);
+            return Ok(());
+        }
+        self.divided += 1 << (3 * (self.made.depth - cell.level().expect("cells have levels")));
+        if self.divided > MOST_CELLS {
+            let problem = "surface cells above the finest level would be divided into too many";
+            return Err(bytes.error(problem, "write the octree with surface cells at the finest level"));
+        }
+        self.coarse(cell, inside);
+        Ok(())
     }
 
     /// Takes a larger cell with corners of both signs; `inside` has a bit for each.
@@ -235,26 +292,37 @@ impl<D: Dialect> Decoder<'_, '_, D> {
 
     /// Takes a cell of the finest level; `inside` has a bit for each corner.
     fn leaf(&mut self, cell: Key, inside: u8, data: D::Leaf) {
-        let (_, at) = self.brick_around(cell);
+        let at = self.brick_around(cell);
+        self.put_leaf(at, inside, data);
+    }
+
+    /// The same, given where in the brick that is being read it lies.
+    #[inline]
+    fn put_leaf(&mut self, at: Local, inside: u8, data: D::Leaf) {
         self.inside[at.index() as usize] = inside;
         self.leaves.set(at);
         self.data[at.index() as usize] = data;
     }
 
-    /// The brick that holds a cell, and where in it the cell lies.
-    fn brick_around(&mut self, cell: Key) -> (&mut Divided, Local) {
+    /// Begins the brick that holds a cell, unless that is being read; where in it the cell lies.
+    fn brick_around(&mut self, cell: Key) -> Local {
         let key = cell.ancestor(self.made.depth - 3);
         if self.brick.as_ref().is_none_or(|brick| brick.key != key) {
-            self.finish_brick();
-            self.leaves = Plane::EMPTY;
+            self.begin_brick(key);
         }
-        let brick = self.brick.get_or_insert(Divided { key, corners: [Plane::EMPTY; 8] });
-        (brick, self::at(self.made.depth, cell))
+        self::at(self.made.depth, cell)
+    }
+
+    fn begin_brick(&mut self, key: Key) {
+        self.finish_brick();
+        (self.leaves, self.filled) = (Plane::EMPTY, Plane::EMPTY);
+        self.brick = Some(Divided { key, corners: [Plane::EMPTY; 8] });
     }
 
     /// Puts down the brick that is being read, if there is any.
     fn finish_brick(&mut self) {
         let Some(mut brick) = self.brick.take() else { return };
+        brick.corners = [self.filled; 8];
         spread(&self.leaves, &self.inside, &mut brick.corners);
         let has_coarse = std::mem::take(&mut self.has_coarse);
         if !has_coarse

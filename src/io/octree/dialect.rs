@@ -52,6 +52,7 @@ pub(super) trait Dialect {
 }
 
 /// Takes as many bytes as the array has.
+#[inline]
 pub(super) fn take<const N: usize, R: Read>(bytes: &mut Bytes<'_, R>) -> Result<[u8; N]> {
     match bytes.take()? {
         Some(taken) => Ok(taken),

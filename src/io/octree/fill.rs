@@ -96,6 +96,7 @@ fn points_round(points: &StoredPoints, brick: Key) -> [[f32; 3]; SIDE.pow(3)] {
 pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided, samples: &mut Vec<Sample>) {
     let origin = lattice_point(frame.depth(), brick.key);
     let table = points_round(points, brick.key);
+    let cells_a_unit = 1.0 / frame.cell_size();
     for (axis, plane) in Axis::ALL.into_iter().zip(brick.crossed()) {
         let [u, v] = axis.others().map(|a| STEP[a.index()]);
         for edge in plane.iter() {
@@ -105,7 +106,7 @@ pub(super) fn from_points(points: &StoredPoints, frame: &Frame, brick: &Divided,
             // Counter-clockwise round the edge.
             let around = [0, u, u + v, v].map(|back| {
                 let point = table[here - back];
-                (DVec3::from(point.map(f64::from)) - model) / frame.cell_size()
+                (DVec3::from(point.map(f64::from)) - model) * cells_a_unit
             });
             samples.push(if around.iter().any(|p| p.is_nan()) {
                 Sample { normal: straight(axis), ..HALF_WAY }
