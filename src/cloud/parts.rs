@@ -14,8 +14,9 @@ const MOST: usize = 3;
 const ALIKE: f64 = 0.8;
 /// Points of a part lie no farther from it than so many spacings. Points of an arc, however round, have no distance in this measure.
 const ALONG: f64 = 0.35;
-/// Parts of less than this of all weight do not count.
-const LEAST: f64 = 0.01;
+/// Parts of which no point lies before or behind the place, but for so many spacings, do not count: what they are there is not known. But the
+/// heaviest always does.
+const BESIDE: f64 = 1.2;
 
 /// A point about a place.
 #[derive(Debug, Clone, Copy)]
@@ -43,21 +44,27 @@ struct Part {
     distance: f64,
     normal: DVec3,
     centre: DVec3,
+    /// The square of the least distance along the plane.
+    beside: f64,
 }
 
 impl Part {
-    const EMPTY: Part = Part { weight: 0.0, distance: 0.0, normal: DVec3::ZERO, centre: DVec3::ZERO };
+    const EMPTY: Part =
+        Part { weight: 0.0, distance: 0.0, normal: DVec3::ZERO, centre: DVec3::ZERO, beside: f64::INFINITY };
 
     fn add(&mut self, place: DVec3, &Weighted { weight, point, normal }: &Weighted) {
+        let way = place - point;
+        let distance = way.dot(normal);
+        self.beside = self.beside.min(way.length_squared() - distance * distance);
         self.weight += weight;
-        self.distance += weight * (place - point).dot(normal);
+        self.distance += weight * distance;
         self.normal += weight * normal;
         self.centre += weight * point;
     }
 
     fn mean(self) -> Part {
         let by = 1.0 / self.weight;
-        Part { weight: self.weight, distance: by * self.distance, normal: by * self.normal, centre: by * self.centre }
+        Part { distance: by * self.distance, normal: by * self.normal, centre: by * self.centre, ..self }
     }
 
     /// Whether two parts lie behind each other, as those of a wall or of an edge that is sharp.
@@ -74,7 +81,6 @@ impl Part {
 
 /// What some points say of a place. Those that were put into a part are taken off the list; `None` if there are none.
 pub(super) fn said(place: DVec3, points: &mut Vec<Weighted>, spacing: f64) -> Option<Said> {
-    let all: f64 = points.iter().map(|p| p.weight).sum();
     let mut parts = [Part::EMPTY; MOST];
     let (mut count, mut heard) = (0, 0.0);
     while count < MOST {
@@ -94,7 +100,7 @@ pub(super) fn said(place: DVec3, points: &mut Vec<Weighted>, spacing: f64) -> Op
             return None;
         }
         heard += part.weight;
-        if part.weight >= LEAST * all {
+        if count == 0 || part.beside <= (BESIDE * spacing).powi(2) {
             parts[count] = part.mean();
             count += 1;
         }

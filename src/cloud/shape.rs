@@ -4,7 +4,7 @@ use super::orient::oriented;
 use super::{Cloud, NONE, Near, Plane};
 use crate::error::Result;
 use crate::progress::{Progress, check};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -18,6 +18,12 @@ const SAME_SHEET: f64 = 0.3;
 const FILTERS: usize = 3;
 /// Normals 45 degrees apart count e^-2 in filters.
 const UNLIKE: f64 = 0.3;
+
+/// Points so many spacings off a plane are not on it.
+const ON_PLANE: f64 = 0.35;
+/// A neighbour's plane is taken where what is off it is this part at most of what is off the own one.
+const BETTER: f64 = 0.6;
+const HALF: f64 = 0.5;
 
 /// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to
 /// two.
@@ -74,10 +80,12 @@ impl Shape {
             };
             let normals: Vec<DVec3> = (0..points.len()).into_par_iter().with_min_len(BATCH).map(normal).collect();
             check(progress)?;
+            let normals = chosen(points, &normals, ON_PLANE * spacing, |i| of(i));
+            check(progress)?;
             let gaps = gap.map_or_else(|| GAPS.map(|n| n * wide_spacing).to_vec(), |gap| vec![gap]);
             let (normals, seen) = oriented(points, normals, &nearest, count, &gaps, progress)?;
             seen_from_outside = seen;
-            (0..FILTERS).fold(normals, |normals, _| filtered(&normals, |i| of(i)))
+            (0..FILTERS).fold(normals, |normals, _| filtered(points, &normals, |i| of(i)))
         };
         let area = |i: usize| {
             let same = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).count();
@@ -91,14 +99,63 @@ impl Shape {
     }
 }
 
+/// Each normal, or that of a neighbour if its plane through the point has more of the points about it: where planes were fitted across an
+/// edge, some neighbour's was not. Then the plane of the points that it has. Those that are `off` a plane or more count alike.
+fn chosen<I: Iterator<Item = usize>>(
+    points: &[DVec3],
+    normals: &[DVec3],
+    off: f64,
+    nearest: impl Fn(usize) -> I + Sync,
+) -> Vec<DVec3> {
+    let choice = |i: usize| {
+        let ways: Vec<DVec3> = nearest(i).map(|j| points[j] - points[i]).collect();
+        let cost = |n: DVec3| ways.iter().map(|way| way.dot(n).powi(2).min(off * off)).sum::<f64>();
+        let own = cost(normals[i]);
+        let candidates = nearest(i).map(|j| (cost(normals[j]), normals[j]));
+        let Some((least, normal)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0)) else { return normals[i] };
+        if least >= BETTER * own {
+            return normals[i];
+        }
+        let on_plane = ways.iter().copied().filter(|way| way.dot(normal).abs() < off).chain([DVec3::ZERO]);
+        let fitted = Plane::fit(on_plane).map_or(normal, |plane| plane.normal);
+        if cost(fitted) < least { fitted } else { normal }
+    };
+    (0..normals.len()).into_par_iter().with_min_len(BATCH).map(choice).collect()
+}
+
 /// Each normal as the mean of those near it, which count less the more they differ: where planes were fitted across an edge, normals turn
 /// to one side (the bilateral filter of Tomasi and Manduchi 1998).
-fn filtered<I: Iterator<Item = usize>>(normals: &[DVec3], nearest: impl Fn(usize) -> I + Sync) -> Vec<DVec3> {
+fn filtered<I: Iterator<Item = usize>>(
+    points: &[DVec3],
+    normals: &[DVec3],
+    nearest: impl Fn(usize) -> I + Sync,
+) -> Vec<DVec3> {
     let mean = |i: usize| {
         let own = normals[i];
-        let others = nearest(i).map(|j| normals[j] * (-own.distance_squared(normals[j]) / UNLIKE).exp());
-        let mean = others.fold(own, |sum, n| sum + n).normalize_or_zero();
-        if mean == DVec3::ZERO { own } else { mean }
+        let (mut sum, mut square, mut off) = (own, DMat3::ZERO, DVec3::ZERO);
+        for j in nearest(i) {
+            let weight = (-own.distance_squared(normals[j]) / UNLIKE).exp();
+            sum += weight * normals[j];
+            let way = points[j] - points[i];
+            // That of an arc through both points mirrors its normals: way . (own + normals[j]) = 0.
+            square += weight * DMat3::from_cols(way * way.x, way * way.y, way * way.z);
+            off += weight * way * way.dot(normals[j]);
+        }
+        let mean = sum.normalize_or_zero();
+        if mean == DVec3::ZERO {
+            return own;
+        }
+        // The turn t, along the plane, that makes the sum of (way . (mean + t) + way . normal)^2 least.
+        let (u, v) = mean.any_orthonormal_pair();
+        let rest = -(square * mean + off);
+        let (a, b, c) = (u.dot(square * u), u.dot(square * v), v.dot(square * v));
+        let (p, q) = (u.dot(rest), v.dot(rest));
+        let determinant = a * c - b * b;
+        if determinant <= 1e-3 * (a + c) * (a + c) {
+            return mean;
+        }
+        let turn = (u * (c * p - b * q) + v * (a * q - b * p)) / determinant;
+        (mean + HALF * turn.clamp_length_max(1.0)).normalize()
     };
     (0..normals.len()).into_par_iter().with_min_len(BATCH).map(mean).collect()
 }

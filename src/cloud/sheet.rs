@@ -19,8 +19,9 @@ use glam::DVec3;
 const WIDTHS: [f64; 2] = [0.5, 1.5];
 /// Points so many widths away do not count: their weight would be 0.002.
 const CUT: f64 = 2.5;
-/// Planes count where the sum of weights is this at least: at some 1.4 widths from a single point.
-const LEAST_WEIGHT: f64 = 0.15;
+/// Planes count where some weight is this at least: within 1.2 widths of a point. Where there is none, no two sheets are so near to each other
+/// that the winding number is in doubt.
+const LEAST_WEIGHT: f64 = 0.24;
 /// Planes count where so much of the weight is of points that lie in three parts at most.
 const LEAST_AGREEMENT: f64 = 0.7;
 /// Between these winding numbers sides are undecided.
@@ -92,7 +93,7 @@ impl Sheet {
     /// What the planes of some points say of a place, if there are enough near it, and they make sense.
     fn said(&self, place: DVec3, points: &[u32], about: &mut Vec<Weighted>) -> Option<Said> {
         about.clear();
-        let mut all = 0.0;
+        let (mut all, mut most) = (0.0, 0.0f64);
         for &i in points {
             let i = i as usize;
             let point = self.near.points()[i];
@@ -100,11 +101,14 @@ impl Sheet {
             if exponent < CUT * CUT {
                 let weight = (-exponent).exp();
                 all += weight;
+                most = most.max(weight);
                 about.push(Weighted { weight, point, normal: self.normals[i] });
             }
         }
-        let said = parts::said(place, about, self.spacing)?;
-        (all >= LEAST_WEIGHT && said.weight >= LEAST_AGREEMENT * all).then_some(said)
+        if most < LEAST_WEIGHT {
+            return None;
+        }
+        parts::said(place, about, self.spacing).filter(|said| said.weight >= LEAST_AGREEMENT * all)
     }
 
     fn value(&self, place: DVec3, points: &[u32], view: &View, about: &mut Vec<Weighted>) -> f64 {
