@@ -16,7 +16,7 @@ const ALIKE: f64 = 0.8;
 const ALONG: f64 = 0.35;
 /// Parts of which no point lies before or behind the place, but for so many spacings, do not count: what they are there is not known. But the
 /// heaviest always does.
-const BESIDE: f64 = 1.2;
+const BESIDE: f64 = 1.6;
 
 /// A point about a place.
 #[derive(Debug, Clone, Copy)]

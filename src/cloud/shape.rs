@@ -20,9 +20,9 @@ const FILTERS: usize = 3;
 const UNLIKE: f64 = 0.3;
 
 /// Points so many spacings off a plane are not on it.
-const ON_PLANE: f64 = 0.35;
+const ON_PLANE: f64 = 0.15;
 /// A neighbour's plane is taken where what is off it is this part at most of what is off the own one.
-const BETTER: f64 = 0.6;
+const BETTER: f64 = 0.8;
 const HALF: f64 = 0.5;
 
 /// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to
@@ -109,14 +109,16 @@ fn chosen<I: Iterator<Item = usize>>(
 ) -> Vec<DVec3> {
     let choice = |i: usize| {
         let ways: Vec<DVec3> = nearest(i).map(|j| points[j] - points[i]).collect();
-        let cost = |n: DVec3| ways.iter().map(|way| way.dot(n).powi(2).min(off * off)).sum::<f64>();
+        let cost = |n: DVec3| {
+            ways.iter().map(|way| way.dot(n).powi(2)).map(|square| square / (square + off * off)).sum::<f64>()
+        };
         let own = cost(normals[i]);
         let candidates = nearest(i).map(|j| (cost(normals[j]), normals[j]));
         let Some((least, normal)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0)) else { return normals[i] };
         if least >= BETTER * own {
             return normals[i];
         }
-        let on_plane = ways.iter().copied().filter(|way| way.dot(normal).abs() < off).chain([DVec3::ZERO]);
+        let on_plane = ways.iter().copied().filter(|way| way.dot(normal).abs() < 2.0 * off).chain([DVec3::ZERO]);
         let fitted = Plane::fit(on_plane).map_or(normal, |plane| plane.normal);
         if cost(fitted) < least { fitted } else { normal }
     };

@@ -19,9 +19,9 @@ use glam::DVec3;
 const WIDTHS: [f64; 2] = [0.5, 1.5];
 /// Points so many widths away do not count: their weight would be 0.002.
 const CUT: f64 = 2.5;
-/// Planes count where some weight is this at least: within 1.2 widths of a point. Where there is none, no two sheets are so near to each other
+/// Planes count where some weight is this at least: within a width of a point. Where there is none, no two sheets are so near to each other
 /// that the winding number is in doubt.
-const LEAST_WEIGHT: f64 = 0.24;
+const LEAST_WEIGHT: f64 = 0.36;
 /// Planes count where so much of the weight is of points that lie in three parts at most.
 const LEAST_AGREEMENT: f64 = 0.7;
 /// Between these winding numbers sides are undecided.
