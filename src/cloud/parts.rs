@@ -125,3 +125,58 @@ pub(super) fn said(place: DVec3, points: &mut Vec<Weighted>, spacing: f64) -> Op
     };
     Some(Said { weight: heard, distance: decides.distance, normal: decides.normal })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a plane through a point, one a unit along two directions across the normal, as seen from a place.
+    fn plane(list: &mut Vec<Weighted>, place: DVec3, through: DVec3, normal: DVec3, is_there: impl Fn(DVec3) -> bool) {
+        let (u, v) = normal.any_orthonormal_pair();
+        for i in -4..=4 {
+            for j in -4..=4 {
+                let point = through + u * f64::from(i) + v * f64::from(j);
+                let weight = (-place.distance_squared(point)).exp();
+                if is_there(point) && weight > 0.002 {
+                    list.push(Weighted { weight, point, normal });
+                }
+            }
+        }
+    }
+
+    fn distance(place: DVec3, planes: &[(DVec3, DVec3)], is_there: impl Fn(DVec3) -> bool) -> f64 {
+        let mut list = Vec::new();
+        planes.iter().for_each(|&(through, normal)| plane(&mut list, place, through, normal, &is_there));
+        said(place, &mut list, 1.0).expect("points").distance
+    }
+
+    #[test]
+    fn walls_and_slots_thinner_than_points_are_apart_keep_both_sides() {
+        for thickness in [0.2, 0.5, 1.0] {
+            let wall = [(DVec3::ZERO, DVec3::NEG_Z), (DVec3::new(0.3, 0.4, thickness), DVec3::Z)];
+            let slot = [(DVec3::ZERO, DVec3::Z), (DVec3::new(0.3, 0.4, thickness), DVec3::NEG_Z)];
+            for z in [-0.6, -0.1, 0.3 * thickness, 0.5 * thickness, 0.9 * thickness, thickness + 0.1] {
+                let place = DVec3::new(0.2, 0.1, z);
+                let beyond = (z - 0.5 * thickness).abs() - 0.5 * thickness;
+                let (of_wall, of_slot) = (distance(place, &wall, |_| true), distance(place, &slot, |_| true));
+                assert!((of_wall - beyond).abs() < 1e-9, "wall of {thickness} at {z}: {of_wall}");
+                assert!((of_slot + beyond).abs() < 1e-9, "slot of {thickness} at {z}: {of_slot}");
+            }
+        }
+    }
+
+    #[test]
+    fn edges_and_corners_are_sharp_both_ways() {
+        let faces = DVec3::AXES.map(|axis| (DVec3::splat(-0.25), axis)).map(|(p, n)| (p * (DVec3::ONE - n), n));
+        for place in [DVec3::new(-0.3, -0.2, -2.0), DVec3::new(0.2, -0.4, -1.5), DVec3::splat(-0.2), DVec3::splat(0.3)]
+        {
+            // The corner of a box at the origin, and the notch of its shape.
+            let of_box = place.max_element();
+            let found = distance(place, &faces, |p| p.max_element() < 1e-9);
+            assert!((found - of_box).abs() < 1e-9, "{place}: {found}");
+            let inward = faces.map(|(p, n)| (p, -n));
+            let found = distance(place, &inward, |p| p.max_element() < 1e-9);
+            assert!((found + of_box).abs() < 1e-9, "{place}: {found}");
+        }
+    }
+}

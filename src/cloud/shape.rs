@@ -19,11 +19,12 @@ const FILTERS: usize = 3;
 /// Normals 45 degrees apart count e^-2 in filters.
 const UNLIKE: f64 = 0.3;
 
-/// Points so many spacings off a plane are not on it.
+/// A point so many spacings off a plane counts half as much against it as one that is far off.
 const ON_PLANE: f64 = 0.15;
-/// A neighbour's plane is taken where what is off it is this part at most of what is off the own one.
+/// A neighbour's plane is taken where less than this part speaks against it of what speaks against the own one: an edge of 90 degrees leaves 0.64.
 const BETTER: f64 = 0.8;
-const HALF: f64 = 0.5;
+/// How much of the turn that would suit the neighbours best is made: all of it would make neighbours swap their errors.
+const TURN: f64 = 0.5;
 
 /// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to
 /// two.
@@ -100,7 +101,8 @@ impl Shape {
 }
 
 /// Each normal, or that of a neighbour if its plane through the point has more of the points about it: where planes were fitted across an
-/// edge, some neighbour's was not. Then the plane of the points that it has. Those that are `off` a plane or more count alike.
+/// edge, some neighbour's was not. Then the plane of the points that it has. What speaks against a plane are the squares of distances from
+/// it, those far above `off` all alike (Geman and McClure 1987).
 fn chosen<I: Iterator<Item = usize>>(
     points: &[DVec3],
     normals: &[DVec3],
@@ -126,7 +128,8 @@ fn chosen<I: Iterator<Item = usize>>(
 }
 
 /// Each normal as the mean of those near it, which count less the more they differ: where planes were fitted across an edge, normals turn
-/// to one side (the bilateral filter of Tomasi and Manduchi 1998).
+/// to one side (the bilateral filter of Tomasi and Manduchi 1998). Then it is turned to where it and those of the points near it mirror each
+/// other, as on an arc: there a plane through few points leans, and means of its like lean with it.
 fn filtered<I: Iterator<Item = usize>>(
     points: &[DVec3],
     normals: &[DVec3],
@@ -139,7 +142,7 @@ fn filtered<I: Iterator<Item = usize>>(
             let weight = (-own.distance_squared(normals[j]) / UNLIKE).exp();
             sum += weight * normals[j];
             let way = points[j] - points[i];
-            // That of an arc through both points mirrors its normals: way . (own + normals[j]) = 0.
+            // Normals that mirror each other: way . (own + normals[j]) = 0.
             square += weight * DMat3::from_cols(way * way.x, way * way.y, way * way.z);
             off += weight * way * way.dot(normals[j]);
         }
@@ -157,7 +160,7 @@ fn filtered<I: Iterator<Item = usize>>(
             return mean;
         }
         let turn = (u * (c * p - b * q) + v * (a * q - b * p)) / determinant;
-        (mean + HALF * turn.clamp_length_max(1.0)).normalize()
+        (mean + TURN * turn.clamp_length_max(1.0)).normalize()
     };
     (0..normals.len()).into_par_iter().with_min_len(BATCH).map(mean).collect()
 }

@@ -2,12 +2,9 @@
 //!
 //! Two things are known of a place. The winding number of the points ([`Dipoles`]) says on which side it is, near points and far from them,
 //! and where holes are closed; but it is a sum over pieces, and rough. The planes of the points near by, each with its normal, blended by
-//! their distance (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points, and not where
-//! points of several sheets are about. So the planes are taken where they agree with the winding number, or where that is undecided, and
-//! where their normals are of one mind; and the winding number everywhere else.
-//!
-//! Where the surface crosses an edge of the lattice, points count less whose normals are unlike that of the nearest one (Oztireli,
-//! Guennebaud and Gross 2009 do so), so that sharp edges stay nearly as sharp as the points have them.
+//! their distance (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points. Where the points near a
+//! place are of several sheets or faces, each has its own plane, and how they lie to each other says how they meet ([`parts`]). So the planes
+//! are taken near points where they agree with the winding number, or where that is undecided; and the winding number everywhere else.
 
 use super::parts::{self, Said, Weighted};
 use super::{Cloud, Dipoles, Near, Shape, View};
