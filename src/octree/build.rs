@@ -72,6 +72,7 @@ impl<T: Send> LinearOctree<T> {
                 in_order(regions.len(), &Silent, Vec::new, grow, put)
             })
             .expect("nothing fails or is cancelled");
+        tree.look_ahead();
         tree
     }
 }
