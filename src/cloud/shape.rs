@@ -14,6 +14,9 @@ const BATCH: usize = 1024;
 /// Normals by less than this (cosine) apart belong to one sheet.
 const SAME_SHEET: f64 = 0.3;
 
+/// No point stands for more than so many times the square of how far all points about it are apart: few of them are on one sheet along narrow faces.
+const MOST_AREA: f64 = 2.5;
+
 /// How often normals are filtered that were found by planes.
 const FILTERS: usize = 3;
 /// Normals 45 degrees apart count e^-2 in filters.
@@ -93,7 +96,8 @@ impl Shape {
             let Some(last) = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).last() else {
                 return spacings[i] * spacings[i];
             };
-            PI * points[i].distance_squared(points[last]) / same as f64
+            let area = PI * points[i].distance_squared(points[last]) / same as f64;
+            area.min(MOST_AREA * spacings[i] * spacings[i])
         };
         let areas = (0..points.len()).into_par_iter().with_min_len(BATCH).map(area).collect();
         Ok(Shape { normals, areas, spacing, wide_spacing, seen_from_outside })
@@ -102,7 +106,7 @@ impl Shape {
 
 /// Each normal, or that of a neighbour if its plane through the point has more of the points about it: where planes were fitted across an
 /// edge, some neighbour's was not. Then the plane of the points that it has. What speaks against a plane are the squares of distances from
-/// it, those far above `off` all alike (Geman and McClure 1987).
+/// it, those far above `off` all alike.
 fn chosen<I: Iterator<Item = usize>>(
     points: &[DVec3],
     normals: &[DVec3],

@@ -16,9 +16,9 @@ use glam::DVec3;
 const WIDTHS: [f64; 2] = [0.5, 1.5];
 /// Points so many widths away do not count: their weight would be 0.002.
 const CUT: f64 = 2.5;
-/// Planes count where some weight is this at least: within a width of a point. Where there is none, no two sheets are so near to each other
-/// that the winding number is in doubt.
-const LEAST_WEIGHT: f64 = 0.36;
+/// Planes count within so many spacings of a point. Where there is none, no two sheets are so near to each other that the winding number is in
+/// doubt.
+const NEARBY: f64 = 1.0;
 /// Planes count where so much of the weight is of points that lie in three parts at most.
 const LEAST_AGREEMENT: f64 = 0.7;
 /// Between these winding numbers sides are undecided.
@@ -90,19 +90,20 @@ impl Sheet {
     /// What the planes of some points say of a place, if there are enough near it, and they make sense.
     fn said(&self, place: DVec3, points: &[u32], about: &mut Vec<Weighted>) -> Option<Said> {
         about.clear();
-        let (mut all, mut most) = (0.0, 0.0f64);
+        let (mut all, mut nearest) = (0.0, f64::INFINITY);
         for &i in points {
             let i = i as usize;
             let point = self.near.points()[i];
-            let exponent = place.distance_squared(point) * self.sharpness[i];
+            let square = place.distance_squared(point);
+            let exponent = square * self.sharpness[i];
             if exponent < CUT * CUT {
                 let weight = (-exponent).exp();
                 all += weight;
-                most = most.max(weight);
+                nearest = nearest.min(square);
                 about.push(Weighted { weight, point, normal: self.normals[i] });
             }
         }
-        if most < LEAST_WEIGHT {
+        if nearest > (NEARBY * self.spacing).powi(2) {
             return None;
         }
         parts::said(place, about, self.spacing).filter(|said| said.weight >= LEAST_AGREEMENT * all)
