@@ -68,7 +68,7 @@ fn resolving(mesh: &Mesh, with_normals: bool) -> Result<f64, String> {
     /// Squares of the spacing on the surface: there are some 0.7 points for each.
     const MOST: f64 = 75_000.0;
     let (report, was) = (mesh.report(), check(mesh).expect("closed"));
-    let mut tried = String::new();
+    let mut tried = Vec::new();
     for percent in WIDTHS {
         let width = percent / 100.0 * report.bounds.extent().length();
         let spacing = if with_normals { width } else { 0.5 * width };
@@ -80,16 +80,16 @@ fn resolving(mesh: &Mesh, with_normals: bool) -> Result<f64, String> {
         let mut own = Mesh::default();
         solid.extract(&options, &mut own, &Silent).expect("a surface");
         if own.faces.is_empty() {
-            tried += &format!(" {percent} %: nothing");
+            tried.push(format!("{percent} %: nothing"));
             continue;
         }
         let (far, is) = (apart(&own, mesh, width), check(&own).expect("closed"));
         if far <= 1.25 && is == was {
             return Ok(if with_normals { percent } else { 0.5 * percent });
         }
-        tried += &format!(" {percent} %: {far:.2} cells, {} parts, {} handles;", is.components, is.genus());
+        tried.push(format!("{percent} %: {far:.2} cells, {} parts, {} handles", is.components, is.genus()));
     }
-    Err(format!("{} parts, {} handles; by itself on grids of{tried}", was.components, was.genus()))
+    Err(format!("{} parts, {} handles; by itself on grids of {}", was.components, was.genus(), tried.join("; ")))
 }
 
 /// Closed meshes of the collection, the small ones; with `ZMEND_CLOUDS=all` all of them. Those that no grid resolves are listed.

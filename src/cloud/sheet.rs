@@ -3,7 +3,7 @@
 //! Two things are known of a place. The winding number of the points ([`Dipoles`]) says on which side it is, near points and far from them,
 //! and where holes are closed; but it is a sum over pieces, and rough. The planes of the points near by, each with its normal, blended by
 //! their distance (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points. Where the points near a
-//! place are of several sheets or faces, each has its own plane, and how they lie to each other says how they meet ([`parts`]). So the planes
+//! place are of several sheets or faces, each has its own plane, and how they lie to each other says how they meet (`parts`). So the planes
 //! are taken near points where they agree with the winding number, or where that is undecided; and the winding number everywhere else.
 
 use super::parts::{self, Said, Weighted};
