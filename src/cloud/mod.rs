@@ -37,6 +37,7 @@ mod dipoles;
 mod near;
 mod orient;
 mod outside;
+mod parts;
 mod pivot;
 mod plane;
 mod scatter;

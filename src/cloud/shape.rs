@@ -4,7 +4,7 @@ use super::orient::oriented;
 use super::{Cloud, NONE, Near, Plane};
 use crate::error::Result;
 use crate::progress::{Progress, check};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -14,10 +14,20 @@ const BATCH: usize = 1024;
 /// Normals by less than this (cosine) apart belong to one sheet.
 const SAME_SHEET: f64 = 0.3;
 
+/// No point stands for more than so many times the square of how far all points about it are apart: few of them are on one sheet along narrow faces.
+const MOST_AREA: f64 = 2.5;
+
 /// How often normals are filtered that were found by planes.
 const FILTERS: usize = 3;
 /// Normals 45 degrees apart count e^-2 in filters.
 const UNLIKE: f64 = 0.3;
+
+/// A point so many spacings off a plane counts half as much against it as one that is far off.
+const ON_PLANE: f64 = 0.15;
+/// A neighbour's plane is taken where less than this part speaks against it of what speaks against the own one: an edge of 90 degrees leaves 0.64.
+const BETTER: f64 = 0.8;
+/// How much of the turn that would suit the neighbours best is made: all of it would make neighbours swap their errors.
+const TURN: f64 = 0.5;
 
 /// Gaps that are tried, in spacings. Points by chance leave holes of up to four and a half, points that keep clear of each other of up to
 /// two.
@@ -74,31 +84,87 @@ impl Shape {
             };
             let normals: Vec<DVec3> = (0..points.len()).into_par_iter().with_min_len(BATCH).map(normal).collect();
             check(progress)?;
+            let normals = chosen(points, &normals, ON_PLANE * spacing, |i| of(i));
+            check(progress)?;
             let gaps = gap.map_or_else(|| GAPS.map(|n| n * wide_spacing).to_vec(), |gap| vec![gap]);
             let (normals, seen) = oriented(points, normals, &nearest, count, &gaps, progress)?;
             seen_from_outside = seen;
-            (0..FILTERS).fold(normals, |normals, _| filtered(&normals, |i| of(i)))
+            (0..FILTERS).fold(normals, |normals, _| filtered(points, &normals, |i| of(i)))
         };
         let area = |i: usize| {
             let same = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).count();
             let Some(last) = of(i).filter(|&j| normals[i].dot(normals[j]) > SAME_SHEET).last() else {
                 return spacings[i] * spacings[i];
             };
-            PI * points[i].distance_squared(points[last]) / same as f64
+            let area = PI * points[i].distance_squared(points[last]) / same as f64;
+            area.min(MOST_AREA * spacings[i] * spacings[i])
         };
         let areas = (0..points.len()).into_par_iter().with_min_len(BATCH).map(area).collect();
         Ok(Shape { normals, areas, spacing, wide_spacing, seen_from_outside })
     }
 }
 
+/// Each normal, or that of a neighbour if its plane through the point has more of the points about it: where planes were fitted across an
+/// edge, some neighbour's was not. Then the plane of the points that it has. What speaks against a plane are the squares of distances from
+/// it, those far above `off` all alike.
+fn chosen<I: Iterator<Item = usize>>(
+    points: &[DVec3],
+    normals: &[DVec3],
+    off: f64,
+    nearest: impl Fn(usize) -> I + Sync,
+) -> Vec<DVec3> {
+    let choice = |i: usize| {
+        let ways: Vec<DVec3> = nearest(i).map(|j| points[j] - points[i]).collect();
+        let cost = |n: DVec3| {
+            ways.iter().map(|way| way.dot(n).powi(2)).map(|square| square / (square + off * off)).sum::<f64>()
+        };
+        let own = cost(normals[i]);
+        let candidates = nearest(i).map(|j| (cost(normals[j]), normals[j]));
+        let Some((least, normal)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0)) else { return normals[i] };
+        if least >= BETTER * own {
+            return normals[i];
+        }
+        let on_plane = ways.iter().copied().filter(|way| way.dot(normal).abs() < 2.0 * off).chain([DVec3::ZERO]);
+        let fitted = Plane::fit(on_plane).map_or(normal, |plane| plane.normal);
+        if cost(fitted) < least { fitted } else { normal }
+    };
+    (0..normals.len()).into_par_iter().with_min_len(BATCH).map(choice).collect()
+}
+
 /// Each normal as the mean of those near it, which count less the more they differ: where planes were fitted across an edge, normals turn
-/// to one side (the bilateral filter of Tomasi and Manduchi 1998).
-fn filtered<I: Iterator<Item = usize>>(normals: &[DVec3], nearest: impl Fn(usize) -> I + Sync) -> Vec<DVec3> {
+/// to one side (the bilateral filter of Tomasi and Manduchi 1998). Then it is turned to where it and those of the points near it mirror each
+/// other, as on an arc: there a plane through few points leans, and means of its like lean with it.
+fn filtered<I: Iterator<Item = usize>>(
+    points: &[DVec3],
+    normals: &[DVec3],
+    nearest: impl Fn(usize) -> I + Sync,
+) -> Vec<DVec3> {
     let mean = |i: usize| {
         let own = normals[i];
-        let others = nearest(i).map(|j| normals[j] * (-own.distance_squared(normals[j]) / UNLIKE).exp());
-        let mean = others.fold(own, |sum, n| sum + n).normalize_or_zero();
-        if mean == DVec3::ZERO { own } else { mean }
+        let (mut sum, mut square, mut off) = (own, DMat3::ZERO, DVec3::ZERO);
+        for j in nearest(i) {
+            let weight = (-own.distance_squared(normals[j]) / UNLIKE).exp();
+            sum += weight * normals[j];
+            let way = points[j] - points[i];
+            // Normals that mirror each other: way . (own + normals[j]) = 0.
+            square += weight * DMat3::from_cols(way * way.x, way * way.y, way * way.z);
+            off += weight * way * way.dot(normals[j]);
+        }
+        let mean = sum.normalize_or_zero();
+        if mean == DVec3::ZERO {
+            return own;
+        }
+        // The turn t, along the plane, that makes the sum of (way . (mean + t) + way . normal)^2 least.
+        let (u, v) = mean.any_orthonormal_pair();
+        let rest = -(square * mean + off);
+        let (a, b, c) = (u.dot(square * u), u.dot(square * v), v.dot(square * v));
+        let (p, q) = (u.dot(rest), v.dot(rest));
+        let determinant = a * c - b * b;
+        if determinant <= 1e-3 * (a + c) * (a + c) {
+            return mean;
+        }
+        let turn = (u * (c * p - b * q) + v * (a * q - b * p)) / determinant;
+        (mean + TURN * turn.clamp_length_max(1.0)).normalize()
     };
     (0..normals.len()).into_par_iter().with_min_len(BATCH).map(mean).collect()
 }

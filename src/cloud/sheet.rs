@@ -2,13 +2,11 @@
 //!
 //! Two things are known of a place. The winding number of the points ([`Dipoles`]) says on which side it is, near points and far from them,
 //! and where holes are closed; but it is a sum over pieces, and rough. The planes of the points near by, each with its normal, blended by
-//! their distance (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points, and not where
-//! points of several sheets are about. So the planes are taken where they agree with the winding number, or where that is undecided, and
-//! where their normals are of one mind; and the winding number everywhere else.
-//!
-//! Where the surface crosses an edge of the lattice, points count less whose normals are unlike that of the nearest one (Oztireli,
-//! Guennebaud and Gross 2009 do so), so that sharp edges stay nearly as sharp as the points have them.
+//! their distance (implicit moving least squares: Kolluri 2008), say exactly how far the surface is; but only near points. Where the points near a
+//! place are of several sheets or faces, each has its own plane, and how they lie to each other says how they meet (`parts`). So the planes
+//! are taken near points where they agree with the winding number, or where that is undecided; and the winding number everywhere else.
 
+use super::parts::{self, Said, Weighted};
 use super::{Cloud, Dipoles, Near, Shape, View};
 use crate::field::{Edge, Function, Zero};
 use crate::geom::Bounds;
@@ -18,14 +16,17 @@ use glam::DVec3;
 const WIDTHS: [f64; 2] = [0.5, 1.5];
 /// Points so many widths away do not count: their weight would be 0.002.
 const CUT: f64 = 2.5;
-/// Planes count where the sum of weights is this at least: at some 1.4 widths from a single point.
-const LEAST_WEIGHT: f64 = 0.15;
-/// Planes count where normals are of one mind: the length of their mean is this at least. 0.8 is that of two faces at 74 degrees.
+/// Planes count within so many spacings of a point. Where there is none, no two sheets are so near to each other that the winding number is in
+/// doubt.
+const NEARBY: f64 = 1.0;
+/// Planes count where so much of the weight is of points that lie in three parts at most.
 const LEAST_AGREEMENT: f64 = 0.7;
 /// Between these winding numbers sides are undecided.
 const UNDECIDED: [f64; 2] = [0.2, 0.8];
-/// Weights fall to 0.3 where normals are 45 degrees apart.
-const UNLIKE: f64 = 0.5;
+/// Places on an edge at which planes are asked where they cross it, at most,
+const STEPS: usize = 5;
+/// and how near the next one is to the last one, as a part of the edge.
+const NEAR: f64 = 0.05;
 
 /// The function of a cloud.
 #[derive(Debug)]
@@ -38,14 +39,6 @@ pub struct Sheet {
     reach: f64,
     spacing: f64,
     dipoles: Dipoles,
-}
-
-/// What planes say of a place.
-#[derive(Debug, Clone, Copy)]
-struct Blend {
-    weight: f64,
-    distance: f64,
-    normal: DVec3,
 }
 
 impl Sheet {
@@ -94,58 +87,56 @@ impl Sheet {
         }
     }
 
-    /// What the planes of some points say of a place; those whose normals are unlike `like` less, if there is any.
-    fn blend(&self, place: DVec3, points: &[u32], like: Option<DVec3>) -> Blend {
-        let mut blend = Blend { weight: 0.0, distance: 0.0, normal: DVec3::ZERO };
+    /// What the planes of some points say of a place, if there are enough near it, and they make sense.
+    fn said(&self, place: DVec3, points: &[u32], about: &mut Vec<Weighted>) -> Option<Said> {
+        about.clear();
+        let (mut all, mut nearest) = (0.0, f64::INFINITY);
         for &i in points {
             let i = i as usize;
-            let way = place - self.near.points()[i];
-            let exponent = way.length_squared() * self.sharpness[i];
+            let point = self.near.points()[i];
+            let square = place.distance_squared(point);
+            let exponent = square * self.sharpness[i];
             if exponent < CUT * CUT {
-                let normal = self.normals[i];
-                let unlike = like.map_or(0.0, |like| like.distance_squared(normal) / UNLIKE);
-                let weight = (-exponent - unlike).exp();
-                blend.weight += weight;
-                blend.distance += weight * way.dot(normal);
-                blend.normal += weight * normal;
+                let weight = (-exponent).exp();
+                all += weight;
+                nearest = nearest.min(square);
+                about.push(Weighted { weight, point, normal: self.normals[i] });
             }
         }
-        if blend.weight > 0.0 {
-            blend.distance /= blend.weight;
-            blend.normal /= blend.weight;
+        if nearest > (NEARBY * self.spacing).powi(2) {
+            return None;
         }
-        blend
+        parts::said(place, about, self.spacing).filter(|said| said.weight >= LEAST_AGREEMENT * all)
     }
 
-    fn value(&self, place: DVec3, points: &[u32], view: &View) -> f64 {
+    fn value(&self, place: DVec3, points: &[u32], view: &View, about: &mut Vec<Weighted>) -> f64 {
         let winding = view.winding(place);
         let by_winding = (0.5 - winding) * 2.0 * self.spacing;
-        let blend = self.blend(place, points, None);
-        let is_sure = blend.weight >= LEAST_WEIGHT && blend.normal.length() >= LEAST_AGREEMENT;
-        let agrees = (blend.distance < 0.0) == (by_winding < 0.0);
         let is_undecided = (UNDECIDED[0]..UNDECIDED[1]).contains(&winding);
-        if is_sure && (agrees || is_undecided) { blend.distance } else { by_winding }
+        let agrees = |said: &Said| is_undecided || (said.distance < 0.0) == (by_winding < 0.0);
+        self.said(place, points, about).filter(agrees).map_or(by_winding, |said| said.distance)
     }
 
-    fn zero(&self, edge: &Edge, points: &[u32]) -> Zero {
-        let linear = edge.linear();
-        let place = edge.place(linear);
-        let square = |i: &&u32| self.near.points()[**i as usize].distance_squared(place);
-        let nearest = points.iter().min_by(|a, b| square(a).total_cmp(&square(b)).then(a.cmp(b)));
-        let Some(&nearest) = nearest else { return Zero { at: linear, slope: self.slope(edge) } };
-        let like = self.normals[nearest as usize];
-        let middle = self.blend(place, points, Some(like));
-        if middle.weight < 0.1 * LEAST_WEIGHT || middle.normal.length() < LEAST_AGREEMENT {
-            return Zero { at: linear, slope: self.slope(edge) };
+    /// Where planes cross an edge: by Newton's steps, and by halves where these lead astray.
+    fn zero(&self, edge: &Edge, points: &[u32], about: &mut Vec<Weighted>) -> Zero {
+        let way = edge.ends[1] - edge.ends[0];
+        let is_outward = edge.values[0] < edge.values[1];
+        let mut range = [0.0, 1.0];
+        let mut zero = Zero { at: edge.linear(), slope: DVec3::ZERO };
+        for _ in 0..STEPS {
+            let Some(said) = self.said(edge.place(zero.at), points, about) else { break };
+            zero.slope = said.normal;
+            range[usize::from((said.distance < 0.0) != is_outward)] = zero.at;
+            let along = said.normal.dot(way);
+            let next = zero.at - said.distance / along;
+            let is_good = (along > 0.0) == is_outward && (range[0]..=range[1]).contains(&next);
+            let step = zero.at;
+            zero.at = if is_good { next } else { 0.5 * (range[0] + range[1]) };
+            if (zero.at - step).abs() < NEAR {
+                break;
+            }
         }
-        // The plane there, and where it meets the edge.
-        let normal = middle.normal.normalize();
-        let along = normal.dot(edge.ends[1] - edge.ends[0]);
-        let outward = edge.values[1] - edge.values[0];
-        if along * outward <= 0.0 {
-            return Zero { at: linear, slope: normal };
-        }
-        Zero { at: (linear - middle.distance / along).clamp(0.0, 1.0), slope: normal }
+        if zero.slope == DVec3::ZERO { Zero { slope: self.slope(edge), ..zero } } else { zero }
     }
 
     /// The direction in which the winding number falls, by differences over an edge.
@@ -158,18 +149,22 @@ impl Sheet {
 
 impl Function for Sheet {
     fn values(&self, places: &[DVec3], out: &mut Vec<f64>) {
+        let mut about = Vec::new();
         self.stretches(
             places,
             |&p| p,
             |places, points, bounds| {
                 let view = self.dipoles.seen_from(bounds.center(), 0.5 * bounds.extent().length());
-                out.extend(places.iter().map(|&p| self.value(p, points, &view)));
+                out.extend(places.iter().map(|&p| self.value(p, points, &view, &mut about)));
             },
         );
     }
 
     fn zeros(&self, edges: &[Edge], out: &mut Vec<Zero>) {
         let place = |edge: &Edge| edge.place(0.5);
-        self.stretches(edges, place, |edges, points, _| out.extend(edges.iter().map(|edge| self.zero(edge, points))));
+        let mut about = Vec::new();
+        self.stretches(edges, place, |edges, points, _| {
+            out.extend(edges.iter().map(|edge| self.zero(edge, points, &mut about)));
+        });
     }
 }

@@ -48,26 +48,31 @@ impl<T: Send> LinearOctree<T> {
         tree.put_block(name, Block { refined: Cells::one(place), ..Block::EMPTY });
         let first = grower.block(Key::ROOT.child(Corner::MIN), Cells::of_level(1), &mut Vec::new());
         let mut regions = vec![Region { cell: Key::ROOT, refined: first.1.refined.byte(0) }];
-        tree.put_block(first.0, first.1);
+        let mut blocks = vec![first];
         for _ in 0..TOP {
             let mut below = Vec::new();
-            regions.into_iter().for_each(|region| grower.below(&mut tree, &region, &mut Vec::new(), &mut below));
+            regions.into_iter().for_each(|region| grower.below(&mut blocks, &region, &mut Vec::new(), &mut below));
             regions = below;
         }
-        let grow = |scratch: &mut Vec<T>, n: usize| {
-            let mut subtree = LinearOctree::new();
-            let mut waiting = Vec::new();
-            grower.below(&mut subtree, &regions[n], scratch, &mut waiting);
-            while let Some(region) = waiting.pop() {
-                grower.below(&mut subtree, &region, scratch, &mut waiting);
-            }
-            subtree
-        };
-        let append = |subtree| {
-            tree.append(subtree);
+        let mut put = |blocks: Vec<(Key, Block<T>)>| {
+            tree.blocks.reserve(blocks.len());
+            blocks.into_iter().for_each(|(name, block)| tree.put_block(name, block));
             Ok(())
         };
-        in_order(regions.len(), &Silent, Vec::new, grow, append).expect("nothing fails or is cancelled");
+        put(blocks)
+            .and_then(|()| {
+                let grow = |scratch: &mut Vec<T>, n: usize| {
+                    let (mut blocks, mut waiting) = (Vec::new(), Vec::new());
+                    grower.below(&mut blocks, &regions[n], scratch, &mut waiting);
+                    while let Some(region) = waiting.pop() {
+                        grower.below(&mut blocks, &region, scratch, &mut waiting);
+                    }
+                    blocks
+                };
+                in_order(regions.len(), &Silent, Vec::new, grow, put)
+            })
+            .expect("nothing fails or is cancelled");
+        tree.look_ahead();
         tree
     }
 }
@@ -80,9 +85,14 @@ struct Grower<'a, S, R> {
 }
 
 impl<S: Fn(Key) -> bool, R> Grower<'_, S, R> {
-    /// The block with the grandchildren of a region; lists those of its children that have refined children in turn.
-    fn below<T>(&self, tree: &mut LinearOctree<T>, region: &Region, scratch: &mut Vec<T>, regions: &mut Vec<Region>)
-    where
+    /// Adds the block with the grandchildren of a region; lists those of its children that have refined children in turn.
+    fn below<T>(
+        &self,
+        blocks: &mut Vec<(Key, Block<T>)>,
+        region: &Region,
+        scratch: &mut Vec<T>,
+        regions: &mut Vec<Region>,
+    ) where
         R: Fn(Key) -> T,
     {
         if region.refined == 0 {
@@ -96,7 +106,7 @@ impl<S: Fn(Key) -> bool, R> Grower<'_, S, R> {
             refined: block.refined.byte(8 * child),
         });
         regions.extend(inside.filter(|inside| inside.refined != 0));
-        tree.put_block(name, block);
+        blocks.push((name, block));
     }
 
     /// Some cells of a block, each split or a leaf. `scratch` is empty before and after.

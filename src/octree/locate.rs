@@ -4,11 +4,24 @@ use super::{CellState, LinearOctree};
 use crate::grid::Key;
 use crate::grid::key::{MAX_LEVEL, SIDE, interleave};
 
+/// Most of the root's volume is in large leaves: searches look first what this level has, in a table of a byte a cell.
+const COARSE: u32 = 4;
+const COARSE_SHIFT: u32 = 3 * (MAX_LEVEL + 1 - COARSE);
+/// The level of the leaf that holds each cell of the coarse level, or one of the following.
+pub(super) type Coarse = [u8; 1 << (3 * COARSE)];
+/// Leaves lie inside the cell.
+const FINER: u8 = 0xff;
+/// No leaf is there.
+const NOTHING: u8 = 0xfe;
+/// Trees with so many leaves have the table, which takes a sixteenth of a byte of each then.
+const MANY: usize = 1 << 16;
+
 /// Leaf search.
 ///
 /// A probe tells of a cell whether it is a leaf, has leaves inside, or lies in a larger leaf or nowhere. So the level of the leaf at a
 /// point is found by bisection of the levels that HAVE leaves, after a look at the finest, where most leaves are: at most 6 probes, and
-/// those of coarse levels hit few blocks, which are in the cache.
+/// those of coarse levels hit few blocks, which are in the cache. Large trees that were built at once, or shrunk, know what their coarse cells have, until a leaf
+/// changes: then one probe finds a large leaf, and others are searched among the finer levels only.
 impl<T> LinearOctree<T> {
     /// The leaf that holds a point given in lattice coordinates, 0 ..= 2^19, with its record.
     ///
@@ -25,8 +38,40 @@ impl<T> LinearOctree<T> {
     /// assert_eq!(tree.locate([1, 2, u32::MAX]), None);
     /// ```
     pub fn locate(&self, point: [u32; 3]) -> Option<(Key, &T)> {
-        let levels = self.levels.occupied;
-        self.search(code_of(point)?, levels, levels.checked_ilog2()?)
+        let (code, mut levels) = (code_of(point)?, self.levels.occupied);
+        match self.levels.coarse.as_ref().map(|coarse| coarse[(code >> COARSE_SHIFT) as usize]) {
+            Some(FINER) => levels &= !((2 << COARSE) - 1),
+            Some(level) => levels &= 1u32.unbounded_shl(u32::from(level)),
+            None => {}
+        }
+        self.search(code, levels, levels.checked_ilog2()?)
+    }
+
+    /// Looks up what the coarse levels have, if there are so many leaves that it costs little beside them.
+    pub(super) fn look_ahead(&mut self) {
+        if self.len() >= MANY {
+            self.look_at_coarse();
+        }
+    }
+
+    fn look_at_coarse(&mut self) {
+        let mut coarse = Box::new([NOTHING; 1 << (3 * COARSE)]);
+        self.list_coarse(Key::ROOT, &mut coarse);
+        self.levels.coarse = Some(coarse);
+    }
+
+    fn list_coarse(&self, cell: Key, coarse: &mut Coarse) {
+        let level = cell.level().expect("a cell");
+        let entry = match self.state(cell) {
+            CellState::Absent => return,
+            CellState::Leaf(_) => level as u8,
+            CellState::Refined if level < COARSE => {
+                return cell.children().into_iter().for_each(|child| self.list_coarse(child, coarse));
+            }
+            CellState::Refined => FINER,
+        };
+        let first = (interleave(cell.min_corner()) >> COARSE_SHIFT) as usize;
+        coarse[first..first + (1 << (3 * (COARSE - level)))].fill(entry);
     }
 
     /// As [`locate`](LinearOctree::locate), for a point whose leaf is likely of about the size of the cell `hint`, such
@@ -86,7 +131,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn search_agrees_with_a_look_at_all_leaves(tree in tree(18), points in points(20)) {
+        fn search_agrees_with_a_look_at_all_leaves(tree in tree(18), points in points(20), looks_ahead: bool) {
+            let mut tree = tree;
+            if looks_ahead {
+                tree.look_at_coarse();
+            }
             let oracle = Oracle::new(&tree);
             let seen = tree.iter().flat_map(|(leaf, _)| leaf.corners().map(Key::center)).take(200);
             let mut hint = Key::ROOT;
@@ -101,6 +150,11 @@ mod tests {
                 hint = found.map_or(hint, |(leaf, _)| leaf);
             }
             prop_assert_eq!(tree.locate([0, SIDE + 1, 0]), None);
+            // What was looked up holds until a leaf changes.
+            if let Some(leaf) = tree.keys_z().first().copied() {
+                tree.remove(leaf);
+                prop_assert_eq!(tree.locate(leaf.center()), None);
+            }
         }
 
         #[test]

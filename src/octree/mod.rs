@@ -64,6 +64,7 @@ use hashbrown::HashMap;
 use crate::grid::Key;
 use crate::grid::block::Cells;
 use crate::grid::key::MAX_LEVEL;
+use locate::Coarse;
 
 pub use blocks::CellState;
 pub use compact::CompactOctree;
@@ -142,16 +143,18 @@ impl<T> LinearOctree<T> {
         self.blocks.reserve(additional.div_ceil(LEAVES_A_BLOCK));
     }
 
-    /// Gives back what memory the leaves do not need. O(n) if it moves them.
+    /// Gives back what memory the leaves do not need, and makes ready for searches. O(n) if it moves them.
     pub fn shrink_to_fit(&mut self) {
         self.blocks.shrink_to_fit();
         self.blocks.values_mut().for_each(|block| block.records.shrink_to_fit());
         self.room = self.blocks.values().map(Block::room).sum();
+        self.look_ahead();
     }
 
     /// Bytes held by the table and the records, not counting what records own elsewhere. O(1).
     pub fn allocated_bytes(&self) -> usize {
-        self.blocks.allocation_size() + self.room * size_of::<T>()
+        let coarse = if self.levels.coarse.is_some() { size_of::<Coarse>() } else { 0 };
+        self.blocks.allocation_size() + self.room * size_of::<T>() + coarse
     }
 
     /// How many leaves there are.
@@ -303,12 +306,15 @@ struct Levels {
     occupied: u32,
     /// Of all levels.
     leaves: usize,
+    /// What the coarse levels have, as long as no leaf has changed since that was looked up.
+    coarse: Option<Box<Coarse>>,
 }
 
 impl Levels {
     /// `more` leaves of the level of `cell`.
     fn add(&mut self, cell: Key, more: usize) {
         let level = cell.level().expect("a leaf is a cell: checked by insert");
+        self.coarse = None;
         self.counts[level as usize] += more;
         self.leaves += more;
         self.occupied |= u32::from(more > 0) << level;
@@ -317,6 +323,7 @@ impl Levels {
     /// `fewer` leaves of the level of `cell`.
     fn remove(&mut self, cell: Key, fewer: usize) {
         let level = cell.level().expect("a leaf is a cell: checked by insert");
+        self.coarse = None;
         self.counts[level as usize] -= fewer;
         self.leaves -= fewer;
         if self.counts[level as usize] == 0 {
