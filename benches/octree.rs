@@ -22,7 +22,7 @@ const COUNT: usize = 1 << 15;
 /// The finest level.
 const DEPTH: u32 = 9;
 /// Radius of the sphere in lattice units; it is centred in the root.
-const RADIUS: u64 = (SIDE as f64 * 0.466) as u64;
+const RADIUS: i64 = (SIDE as f64 * 0.466) as i64;
 
 /// A cell's centre, and a number that the published layout carries along.
 type Centre = [i64; 4];
@@ -37,15 +37,14 @@ fn random(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Whether the sphere passes through a cell.
+/// Whether the sphere passes through a cell. Both trees ask this.
 fn is_cut(cell: Key) -> bool {
-    let (min, max, centre) = (cell.min_corner(), cell.max_corner(), u64::from(SIDE / 2));
     let (mut nearest, mut farthest) = (0, 0);
-    for i in 0..3 {
-        let (low, high) = (u64::from(min[i]), u64::from(max[i]));
-        let (below, above) = (low.abs_diff(centre), high.abs_diff(centre));
-        nearest += if (low..=high).contains(&centre) { 0 } else { below.min(above).pow(2) };
-        farthest += below.max(above).pow(2);
+    for low in cell.min_corner() {
+        let low = i64::from(low) - i64::from(SIDE / 2);
+        let high = low + i64::from(cell.size());
+        nearest += low.max(-high).max(0).pow(2);
+        farthest += high.max(-low).pow(2);
     }
     (nearest..=farthest).contains(&RADIUS.pow(2))
 }

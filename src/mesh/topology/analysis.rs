@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// What kind of surface a mesh is. Several may hold at once; a closed manifold solid is neither empty nor any of the others.
+/// What kind of surface a mesh is. Several may hold at once; a closed manifold solid is neither empty nor any of the others, but for duplicates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a finding of its own")]
 pub struct MeshKind {
@@ -29,9 +29,10 @@ pub struct MeshKind {
 }
 
 impl MeshKind {
-    /// Whether this is a closed surface on which every edge has two users that run opposite ways and every point one fan.
+    /// Whether this is a closed surface on which every edge has two users that run opposite ways and every point one fan. A face that comes
+    /// twice may be one: two faces back to back.
     pub fn is_closed_manifold(self) -> bool {
-        self == MeshKind::default()
+        MeshKind { has_duplicates: false, ..self } == MeshKind::default()
     }
 }
 

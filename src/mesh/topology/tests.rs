@@ -130,6 +130,13 @@ fn case_clean() {
     assert_eq!(kind(4, &TETRAHEDRON[1..]), "open");
 }
 
+/// Two faces back to back are a closed surface, although one face comes twice.
+#[test]
+fn case_pillow() {
+    let pillow = Topology::new(&mesh(3, &[&[0, 1, 2], &[0, 2, 1]])).kind();
+    assert!(pillow.has_duplicates && pillow.is_closed_manifold(), "{pillow}");
+}
+
 #[test]
 fn case_empty_mesh() {
     assert_eq!(kind(0, &[]), "empty");
