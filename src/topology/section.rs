@@ -321,15 +321,12 @@ impl Rim<'_> {
         let [hh, lh, hl, ll] = cells.map(|cell| cell.map_or([0.0; 3], |cell| self.signs.moved(self.complex, cell)));
         // Half the cross product of the diagonals, from (low, low) to (high, high) and from (high, low) to (low, high).
         let diagonal = |from: [f64; 3], to: [f64; 3], along_u: f64| {
-            let mut diagonal = [0.0; 3];
-            (diagonal[u.index()], diagonal[v.index()]) = (along_u, 0.5);
-            (0..3).for_each(|a| diagonal[a] += to[a]);
+            let mut diagonal: [f64; 3] = std::array::from_fn(|a| to[a] - from[a]);
             diagonal[u.index()] += along_u;
-            diagonal[v.index()] += 0.5;
-            (0..3).for_each(|a| diagonal[a] -= from[a]);
+            diagonal[v.index()] += 1.0;
             diagonal
         };
-        let (p, q) = (diagonal(ll, hh, 0.5), diagonal(hl, lh, -0.5));
+        let (p, q) = (diagonal(ll, hh, 1.0), diagonal(hl, lh, -1.0));
         std::array::from_fn(|a| {
             let (b, c) = ((a + 1) % 3, (a + 2) % 3);
             (p[b] * q[c] - p[c] * q[b]) / 2.0
