@@ -4,24 +4,52 @@ use super::{CellState, LinearOctree};
 use crate::grid::Key;
 use crate::grid::key::{MAX_LEVEL, SIDE, interleave};
 
-/// Most of the root's volume is in large leaves: searches look first what this level has, in a table of a byte a cell.
-const COARSE: u32 = 4;
-const COARSE_SHIFT: u32 = 3 * (MAX_LEVEL + 1 - COARSE);
-/// The level of the leaf that holds each cell of the coarse level, or one of the following.
-pub(super) type Coarse = [u8; 1 << (3 * COARSE)];
+/// The level of the leaf that holds each cell of a coarse level: most of the root's volume is in large leaves, so searches look there first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Coarse {
+    /// Bits of an interleaved point below its cell.
+    shift: u32,
+    /// The levels that are finer than the table's.
+    finer: u32,
+    /// By cell, in Z-order: a level, or one of the following.
+    cells: Box<[u8]>,
+}
+
 /// Leaves lie inside the cell.
 const FINER: u8 = 0xff;
 /// No leaf is there.
 const NOTHING: u8 = 0xfe;
-/// Trees with so many leaves have the table, which takes a sixteenth of a byte of each then.
-const MANY: usize = 1 << 16;
+/// Levels that a table may have. Trees with fewer leaves than make the first worth its while have none.
+const LEVELS: [u32; 2] = [4, 5];
+/// Leaves for each byte of the table, at least.
+const LEAVES: usize = 8;
+
+impl Coarse {
+    /// A table of nothing.
+    fn new(level: u32) -> Self {
+        let cells = vec![NOTHING; 1 << (3 * level)].into_boxed_slice();
+        Coarse { shift: 3 * (MAX_LEVEL + 1 - level), finer: !((2 << level) - 1), cells }
+    }
+
+    /// The levels that the leaf at an interleaved point may have.
+    fn levels(&self, code: u64) -> u32 {
+        match self.cells[(code >> self.shift) as usize] {
+            FINER => self.finer,
+            level => 1u32.unbounded_shl(u32::from(level)),
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Coarse>() + self.cells.len()
+    }
+}
 
 /// Leaf search.
 ///
 /// A probe tells of a cell whether it is a leaf, has leaves inside, or lies in a larger leaf or nowhere. So the level of the leaf at a
-/// point is found by bisection of the levels that HAVE leaves, after a look at the finest, where most leaves are: at most 6 probes, and
+/// point is found by bisection of the levels that have leaves, after a look at the finest, where most leaves are: at most 6 probes, and
 /// those of coarse levels hit few blocks, which are in the cache. Large trees that were built at once, or shrunk, know what their coarse cells have, until a leaf
-/// changes: then one probe finds a large leaf, and others are searched among the finer levels only.
+/// changes: then one probe finds a large leaf, and others are searched among the finer levels only. The table takes an eighth of a byte a leaf.
 impl<T> LinearOctree<T> {
     /// The leaf that holds a point given in lattice coordinates, 0 ..= 2^19, with its record.
     ///
@@ -39,39 +67,40 @@ impl<T> LinearOctree<T> {
     /// ```
     pub fn locate(&self, point: [u32; 3]) -> Option<(Key, &T)> {
         let (code, mut levels) = (code_of(point)?, self.levels.occupied);
-        match self.levels.coarse.as_ref().map(|coarse| coarse[(code >> COARSE_SHIFT) as usize]) {
-            Some(FINER) => levels &= !((2 << COARSE) - 1),
-            Some(level) => levels &= 1u32.unbounded_shl(u32::from(level)),
-            None => {}
+        if let Some(coarse) = &self.levels.coarse {
+            levels &= coarse.levels(code);
         }
         self.search(code, levels, levels.checked_ilog2()?)
     }
 
     /// Looks up what the coarse levels have, if there are so many leaves that it costs little beside them.
     pub(super) fn look_ahead(&mut self) {
-        if self.len() >= MANY {
-            self.look_at_coarse();
+        let [least, most] = LEVELS;
+        let level = (self.len() / LEAVES).checked_ilog2().map_or(0, |bits| bits / 3).min(most);
+        if level >= least {
+            self.look_at_coarse(level);
         }
     }
 
-    fn look_at_coarse(&mut self) {
-        let mut coarse = Box::new([NOTHING; 1 << (3 * COARSE)]);
-        self.list_coarse(Key::ROOT, &mut coarse);
-        self.levels.coarse = Some(coarse);
+    fn look_at_coarse(&mut self, level: u32) {
+        let mut coarse = Coarse::new(level);
+        self.list_coarse(Key::ROOT, level, &mut coarse);
+        self.levels.coarse = Some(Box::new(coarse));
     }
 
-    fn list_coarse(&self, cell: Key, coarse: &mut Coarse) {
+    /// Enters a cell of a level up to `last`, and all inside of it.
+    fn list_coarse(&self, cell: Key, last: u32, coarse: &mut Coarse) {
         let level = cell.level().expect("a cell");
         let entry = match self.state(cell) {
             CellState::Absent => return,
             CellState::Leaf(_) => level as u8,
-            CellState::Refined if level < COARSE => {
-                return cell.children().into_iter().for_each(|child| self.list_coarse(child, coarse));
+            CellState::Refined if level < last => {
+                return cell.children().into_iter().for_each(|child| self.list_coarse(child, last, coarse));
             }
             CellState::Refined => FINER,
         };
-        let first = (interleave(cell.min_corner()) >> COARSE_SHIFT) as usize;
-        coarse[first..first + (1 << (3 * (COARSE - level)))].fill(entry);
+        let first = (interleave(cell.min_corner()) >> coarse.shift) as usize;
+        coarse.cells[first..first + (1 << (3 * (last - level)))].fill(entry);
     }
 
     /// As [`locate`](LinearOctree::locate), for a point whose leaf is likely of about the size of the cell `hint`, such
@@ -131,10 +160,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn search_agrees_with_a_look_at_all_leaves(tree in tree(18), points in points(20), looks_ahead: bool) {
+        fn search_agrees_with_a_look_at_all_leaves(tree in tree(18), points in points(20), ahead in 0..7u32) {
             let mut tree = tree;
-            if looks_ahead {
-                tree.look_at_coarse();
+            if ahead > 0 {
+                tree.look_at_coarse(ahead);
             }
             let oracle = Oracle::new(&tree);
             let seen = tree.iter().flat_map(|(leaf, _)| leaf.corners().map(Key::center)).take(200);

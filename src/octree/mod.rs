@@ -153,7 +153,7 @@ impl<T> LinearOctree<T> {
 
     /// Bytes held by the table and the records, not counting what records own elsewhere. O(1).
     pub fn allocated_bytes(&self) -> usize {
-        let coarse = if self.levels.coarse.is_some() { size_of::<Coarse>() } else { 0 };
+        let coarse = self.levels.coarse.as_ref().map_or(0, |coarse| coarse.bytes());
         self.blocks.allocation_size() + self.room * size_of::<T>() + coarse
     }
 

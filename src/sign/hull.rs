@@ -33,7 +33,7 @@ use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::{EdgeHit, OrientedHits};
 use crate::octree::regions::{ClosedBricks, ClosedEdges, REGION_BYTES, Regions};
 use crate::octree::signed::{GIVEN_BYTES, SignedOctree};
-use crate::progress::{Beside, Progress};
+use crate::progress::{Beside, Progress, check};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::iter::Peekable;
@@ -93,13 +93,16 @@ pub fn hull_with_gap(
     let held = held + faces.bytes() + faces.keys().len() * (WALL_BYTES + GIVEN_BYTES);
     progress.hold(held as u64)?;
     let far = walls(hits, &[&faces], |key| !faces.within(key, radius));
+    check(progress)?;
     let far_regions = Regions::new(&far);
+    check(progress)?;
     let outer = |key: Key| match far.find(key) {
         Some(i) => far_regions.points_in(i, |region| region == 0),
         None if far_regions.of_absent(key) == 0 => Plane::FULL,
         None => Plane::EMPTY,
     };
     let rolled = rolled(hits, &far, &faces, radius, outer);
+    check(progress)?;
     let beside = Beside { progress, bytes: held as u64 };
     let rim = Band::around_crossings(rolled.crossings(), radius + tolerance(radius), &beside)?;
     drop(rolled);
@@ -107,12 +110,15 @@ pub fn hull_with_gap(
     progress.hold((held + rim.bytes() + most * (WALL_BYTES + GIVEN_BYTES)) as u64)?;
     let grown = |key: Key| outer(key) | rim.within(key, radius + tolerance(radius));
     let near = walls(hits, &[&faces, &rim], grown);
+    check(progress)?;
     let regions = Regions::new(&near);
+    check(progress)?;
 
     let signs: Vec<(Key, Plane)> = (0..near.len())
         .into_par_iter()
         .map(|i| (near.key(i), clipped(near.key(i), !regions.points_in(i, |region| region == 0))))
         .collect();
+    check(progress)?;
     let samples = |i: usize, crossed: &[Plane; 3], out: &mut Vec<Sample>| {
         let (key, inside) = &signs[i];
         let origin = lattice_point(frame.depth(), *key);

@@ -82,12 +82,11 @@ pub(crate) fn case(number: u64) -> Case {
     Case { mesh, options, words: words.join(", ") }
 }
 
-/// The longest side of the bounds of what is finite; 1 if there is nothing, or all in one place.
+/// The longest side of the bounds of what is finite; 0 if there is nothing, or all in one place.
 fn extent(mesh: &Mesh) -> f64 {
     let mut bounds = Bounds::EMPTY;
     mesh.faces.corners().iter().for_each(|&i| bounds.add(mesh.points[i as usize]));
-    let size = if bounds.is_empty() { 0.0 } else { bounds.extent().max_element() };
-    if size > 0.0 { size } else { 1.0 }
+    if bounds.is_empty() { 0.0 } else { bounds.extent().max_element() }
 }
 
 fn solid(chance: &mut Chance) -> (String, Mesh) {
@@ -151,11 +150,12 @@ fn drawn_options(number: u64, mesh: &Mesh, chance: &mut Chance, words: &mut Vec<
     if chance.below(8) == 0 {
         options.scale = 0.05 + 0.94 * chance.unit();
     }
-    // The grid grows with widths: so many cells are a width of which both sides of the model get as much as it is.
-    let (extent, cells) = (extent(mesh), options.scale * f64::from(1u32 << depth));
+    // The grid grows with widths: so many cells are a width of which both sides of the model get as much as it is. A single point has no widths.
+    let (own, cells) = (extent(mesh), options.scale * f64::from(1u32 << depth));
+    let extent = if own > 0.0 { own } else { 1.0 };
     let mut width = |from: f64, to: f64| {
         let wanted = from + (to - from) * chance.unit();
-        (cells > 4.0 * wanted).then(|| wanted * extent / (cells - 2.0 * wanted))
+        (own > 0.0 && cells > 4.0 * wanted).then(|| wanted * extent / (cells - 2.0 * wanted))
     };
     let (gap, wall, offset) = (width(1.0, 6.0), width(2.1, 6.0), width(2.0, 5.0));
     let (cell, size) = (extent / cells, (1.0 + 9.0 * chance.unit()) * extent / cells);

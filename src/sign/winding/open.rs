@@ -248,14 +248,14 @@ impl<'a> Bricks<'a> {
 }
 
 /// Levels between a district and its bricks.
-const DISTRICT: u32 = 2;
+const DISTRICT: u32 = 1;
 
 /// The root, divided into calm cells and rough bricks.
 #[derive(Default)]
 struct Parts {
     /// The first brick of each, in order of keys, and the least number that is inside; none for rough bricks.
     parts: Vec<(Key, Option<i32>)>,
-    /// The cells of 4 x 4 x 4 bricks that have several parts, sorted, and what they see.
+    /// The cells of 2 x 2 x 2 bricks that have several parts, sorted, and what they see.
     districts: Vec<(Key, Field)>,
 }
 

@@ -8,7 +8,7 @@
 
 use super::boundary::Corner;
 use super::field::{Field, Seen, Triangle};
-use super::polynomial::{Batch, EXPONENTS, Polynomial, TERMS};
+use super::polynomial::{Batch, EXPONENTS, Polynomial, TERMS, Values};
 use super::span::{Span, position};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -76,11 +76,7 @@ impl View {
                 *angle += coefficient as f32 * power;
             }
         }
-        for &triangle in &self.near {
-            let corners =
-                span.triangles[triangle as usize].map(|corner| ((position(corner) - from) / unit).as_vec3().to_array());
-            add_near(corners, &mut angles);
-        }
+        add_all(span, &self.near, from, unit, &mut angles);
         angles.map(|angle| angle / (4.0 * PI) as f32)
     }
 
@@ -105,6 +101,22 @@ impl View {
         let mut polynomial = field.far_from(middle);
         polynomial.add(batch);
         polynomial
+    }
+}
+
+/// The solid angles of some triangles together, at points about a middle.
+pub(super) fn angles_about(span: &Span, triangles: &[u32], middle: DVec3, unit: f64) -> Values {
+    let mut angles = [0.0; POINTS];
+    // Places are half a unit below.
+    add_all(span, triangles, middle + 0.5 * unit, unit, &mut angles);
+    angles
+}
+
+/// Adds the solid angles of triangles at all places, as seen from a middle.
+fn add_all(span: &Span, triangles: &[u32], from: DVec3, unit: f64, angles: &mut Angles) {
+    for &triangle in triangles {
+        let corners = span.triangles[triangle as usize];
+        add_near(corners.map(|corner| ((position(corner) - from) / unit).as_vec3().to_array()), angles);
     }
 }
 
