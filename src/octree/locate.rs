@@ -40,7 +40,7 @@ impl Coarse {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of::<Coarse>() + self.cells.len()
+        self.cells.len()
     }
 }
 
@@ -85,7 +85,7 @@ impl<T> LinearOctree<T> {
     fn look_at_coarse(&mut self, level: u32) {
         let mut coarse = Coarse::new(level);
         self.list_coarse(Key::ROOT, level, &mut coarse);
-        self.levels.coarse = Some(Box::new(coarse));
+        self.levels.coarse = Some(coarse);
     }
 
     /// Enters a cell of a level up to `last`, and all inside of it.

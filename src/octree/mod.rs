@@ -153,7 +153,7 @@ impl<T> LinearOctree<T> {
 
     /// Bytes held by the table and the records, not counting what records own elsewhere. O(1).
     pub fn allocated_bytes(&self) -> usize {
-        let coarse = self.levels.coarse.as_ref().map_or(0, |coarse| coarse.bytes());
+        let coarse = self.levels.coarse.as_ref().map_or(0, Coarse::bytes);
         self.blocks.allocation_size() + self.room * size_of::<T>() + coarse
     }
 
@@ -307,7 +307,7 @@ struct Levels {
     /// Of all levels.
     leaves: usize,
     /// What the coarse levels have, as long as no leaf has changed since that was looked up.
-    coarse: Option<Box<Coarse>>,
+    coarse: Option<Coarse>,
 }
 
 impl Levels {
