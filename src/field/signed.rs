@@ -58,7 +58,7 @@ impl Field {
             function.zeros(&list, &mut zeros);
             out.extend(edges.iter().zip(zeros).map(|((axis, _), zero)| sample(*axis, zero)));
         };
-        Ok(SignedOctree::from_signs(depth, true, &signs, is_inside, samples))
+        SignedOctree::try_from_signs(depth, true, &signs, is_inside, samples, progress)
     }
 
     /// The bricks that the surface passes through or touches, sorted.

@@ -2,10 +2,11 @@
 
 use super::cells::CellEdges;
 use super::crossings::{Brick, Builder, Crossings, Sample, finest_element, lattice_point, position, toward};
+use crate::error::Result;
 use crate::grid::brick::{Bits, Local, Plane};
 use crate::grid::{Axis, Extent, Key};
 use crate::parallel::{in_order, pieces};
-use crate::progress::Silent;
+use crate::progress::{Progress, Silent};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -103,6 +104,22 @@ impl SignedOctree {
         uniform: impl Fn(Key) -> bool + Sync,
         samples: impl Fn(usize, &[Plane; 3], &mut Vec<Sample>) + Sync,
     ) -> Self {
+        let octree = Self::try_from_signs(depth, with_normals, signs, uniform, samples, &Silent);
+        octree.expect("nothing fails or is cancelled")
+    }
+
+    /// As [`from_signs`](Self::from_signs), until `progress` says that it is cancelled.
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub(crate) fn try_from_signs(
+        depth: u32,
+        with_normals: bool,
+        signs: &[(Key, Plane)],
+        uniform: impl Fn(Key) -> bool + Sync,
+        samples: impl Fn(usize, &[Plane; 3], &mut Vec<Sample>) + Sync,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         assert!(signs.is_sorted_by(|a, b| a.0 < b.0), "bricks are sorted");
         let mut places = super::LinearOctree::with_capacity(signs.len());
         for (place, &(key, _)) in (0u32..).zip(signs) {
@@ -147,8 +164,8 @@ impl SignedOctree {
             }
             Ok(())
         };
-        in_order(count, &Silent, || (), make, append).expect("nothing fails or is cancelled");
-        SignedOctree::from_crossings(builder.finish())
+        in_order(count, progress, || (), make, append)?;
+        Ok(SignedOctree::from_crossings(builder.finish()))
     }
 
     /// An octree of which nothing is inside.

@@ -75,7 +75,7 @@ impl Solid {
                 }));
             }
         };
-        let octree = SignedOctree::from_signs(depth, true, &signs, |key| bricks.is_full(key), samples);
+        let octree = SignedOctree::try_from_signs(depth, true, &signs, |key| bricks.is_full(key), samples, progress)?;
         Ok(Solid::new(octree, frame))
     }
 }

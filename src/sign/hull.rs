@@ -59,7 +59,7 @@ pub fn hull(hits: &OrientedHits, progress: &dyn Progress) -> Result<SignedOctree
         });
     };
     let uniform = |key| regions.of_absent(key) != 0;
-    Ok(SignedOctree::from_signs(edges.depth(), edges.with_normals(), &signs, uniform, samples))
+    SignedOctree::try_from_signs(edges.depth(), edges.with_normals(), &signs, uniform, samples, progress)
 }
 
 /// Of the hits of an edge, the one that is nearest to its outer end.
@@ -133,7 +133,7 @@ pub fn hull_with_gap(
         });
     };
     let uniform = |key| regions.of_absent(key) != 0;
-    Ok(SignedOctree::from_signs(frame.depth(), hits.edges().with_normals(), &signs, uniform, samples))
+    SignedOctree::try_from_signs(frame.depth(), hits.edges().with_normals(), &signs, uniform, samples, progress)
 }
 
 /// The surface on which the centre of the ball rolls: what the outside does not reach as long as it keeps its distance.

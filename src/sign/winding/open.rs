@@ -105,7 +105,7 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
     }
     let edges = hits.edges();
     let rule = if patches.reversed() { Rule::Negative } else { Rule::Positive };
-    let octree = SignedOctree::from_signs(depth, edges.with_normals(), &signs, uniform, |i, crossed, out| {
+    let samples = |i: usize, crossed: &[Plane; 3], out: &mut Vec<Sample>| {
         let (key, inside) = &signs[i];
         let origin = lattice_point(depth, *key);
         let field = OnceCell::new();
@@ -115,7 +115,8 @@ pub fn winding_signs(hits: &OrientedHits, patches: &Patches, progress: &dyn Prog
             angles.sample(field, axis, std::array::from_fn(|a| origin[a] + c[a]), edges.with_normals())
         };
         push_samples(hits, *key, inside, crossed, rule, elsewhere, out);
-    });
+    };
+    let octree = SignedOctree::try_from_signs(depth, edges.with_normals(), &signs, uniform, samples, progress)?;
     Ok(Winding { octree, clipped })
 }
 
