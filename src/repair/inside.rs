@@ -7,7 +7,7 @@ use crate::geom::Frame;
 use crate::mesh::TriangleSource;
 use crate::octree::SignedOctree;
 use crate::octree::signed::SIGN_BYTES;
-use crate::progress::{Progress, Stage};
+use crate::progress::{Progress, Stage, check};
 use crate::sign::winding::{Boundary, Circulation, Patches, WholeNumbers, circulations, winding_signs};
 use crate::sign::{Closing, OrientedScan, Scan, ScanCounts, close, parity_signs, scan, scan_oriented, vanished};
 use std::fmt;
@@ -86,7 +86,7 @@ pub(super) fn tell(
     }
     let scan = clock.time(Stage::Scan, || scan_oriented(source, frame, with_normals, progress))?;
     progress.begin(Stage::Close, 0);
-    let boundary = clock.time(Stage::Close, || circulations(&scan.hits));
+    let boundary = clock.time(Stage::Close, || circulations(&scan.hits, progress))?;
     if boundary.is_empty() {
         return without_boundary(scan, inside, clock, progress);
     }
@@ -126,6 +126,7 @@ fn by_parity(scan: Scan, reason: Reason, clock: &mut Clock, progress: &dyn Progr
 fn without_boundary(scan: OrientedScan, inside: Inside, clock: &mut Clock, progress: &dyn Progress) -> Result<Told> {
     progress.begin(Stage::Sign, 0);
     let numbers = clock.time(Stage::Sign, || WholeNumbers::new(&scan.hits));
+    check(progress)?;
     let (rule, reason) = match inside {
         Inside::Auto if numbers.overlap() => (Inside::Winding, Reason::Overlaps),
         // Pairs of coincident walls are not looked into by winding numbers.
@@ -135,7 +136,7 @@ fn without_boundary(scan: OrientedScan, inside: Inside, clock: &mut Clock, progr
         Inside::Auto => (Inside::Parity, Reason::Sound),
         rule => (rule, Reason::Asked),
     };
-    let octree = clock.time(Stage::Sign, || numbers.into_octree(scan.hits));
+    let octree = clock.time(Stage::Sign, || numbers.into_octree(scan.hits, progress))?;
     let choice = InsideChoice { rule, reason, reversed: false };
     Ok(Told { octree, counts: scan.counts, closing: Closing::default(), choice, clipped: 0, vanished: 0 })
 }

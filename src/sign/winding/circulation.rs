@@ -11,10 +11,12 @@
 //! Others are counted bit by bit, some 1 us each.
 
 use super::net::Net;
+use crate::error::Result;
 use crate::grid::brick::{Local, Plane};
 use crate::grid::{Axis, Extent, Key};
 use crate::octree::crossings::{Crossings, finest_element};
 use crate::octree::hits::OrientedHits;
+use crate::progress::{Progress, check};
 use rayon::prelude::*;
 
 /// A grid face through which the surface's boundary passes.
@@ -26,12 +28,22 @@ pub struct Circulation {
     pub strength: i32,
 }
 
+/// Bricks between two looks whether it was cancelled.
+const AT_ONCE: usize = 1 << 15;
+
 /// All finest faces with a circulation, sorted.
-pub fn circulations(hits: &OrientedHits) -> Vec<Circulation> {
-    let bricks = (0..hits.edges().bricks().len()).into_par_iter();
-    let mut found: Vec<Circulation> = bricks.flat_map_iter(|i| of_brick(hits, i)).collect();
+///
+/// # Errors
+/// `Cancelled`.
+pub fn circulations(hits: &OrientedHits, progress: &dyn Progress) -> Result<Vec<Circulation>> {
+    let count = hits.edges().bricks().len();
+    let mut found = Vec::new();
+    for first in (0..count).step_by(AT_ONCE) {
+        check(progress)?;
+        found.par_extend((first..count.min(first + AT_ONCE)).into_par_iter().flat_map_iter(|i| of_brick(hits, i)));
+    }
     found.par_sort_unstable();
-    found
+    Ok(found)
 }
 
 /// Those of the faces that start in a brick.

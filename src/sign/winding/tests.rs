@@ -111,7 +111,7 @@ fn soup(corners: &[[f64; 3]]) -> Mesh {
 fn assert_spanned(mesh: &Mesh, depth: u32) {
     let (hits, frame) = hits_of(mesh, depth);
     let mut jumps = jumps_of(&hits);
-    assert!(circulations(&hits) == plain_circulations(&jumps));
+    assert!(circulations(&hits, &Silent).expect("not cancelled") == plain_circulations(&jumps));
     let patches = patches_of(mesh, &frame);
     for (edge, jump) in jumps_of(patches.hits()) {
         *jumps.entry(edge).or_insert(0) += if patches.reversed() { -jump } else { jump };
@@ -150,10 +150,10 @@ proptest! {
             }
         }
         let (hits, frame) = hits_of(&mesh, 5);
-        prop_assert_eq!(circulations(&hits), []);
+        prop_assert_eq!(circulations(&hits, &Silent).expect("not cancelled"), []);
         let numbers = WholeNumbers::new(&hits);
         let (overlap, single) = (numbers.overlap(), hits.are_single());
-        let octree = numbers.into_octree(hits);
+        let octree = numbers.into_octree(hits, &Silent).expect("not cancelled");
         prop_assert_eq!(octree.validate(), Ok(()));
         if !overlap {
             let parity = scan(&mut &mesh, &frame, true, &Silent).expect("scanned").crossings;

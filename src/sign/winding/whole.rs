@@ -3,9 +3,12 @@
 use super::levels::{Nonzero, Rows, Steps};
 use super::net::Net;
 use super::samples::{Rule, push_samples};
+use crate::error::Result;
 use crate::grid::brick::Plane;
 use crate::octree::SignedOctree;
+use crate::octree::crossings::Sample;
 use crate::octree::hits::OrientedHits;
+use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// The winding numbers of closed, consistently oriented surfaces: those without [circulation](super::circulations).
@@ -37,19 +40,23 @@ impl WholeNumbers {
 
     /// The octree of the points whose number is not 0. Cost: that of [`SignedOctree::from_signs`]; next to nothing without overlap, if no
     /// edge has several hits.
-    pub fn into_octree(self, hits: OrientedHits) -> SignedOctree {
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub fn into_octree(self, hits: OrientedHits, progress: &dyn Progress) -> Result<SignedOctree> {
         if !self.overlap && hits.are_single() {
-            return SignedOctree::new(hits.into_edges(), self.inside);
+            return Ok(SignedOctree::new(hits.into_edges(), self.inside));
         }
         let edges = hits.edges();
         let depth = edges.depth();
         let signs: Vec<_> = edges.bricks().iter().map(|brick| brick.key).zip(self.inside).collect();
         let uniform = |key| self.rows.between(key, depth) != 0;
-        SignedOctree::from_signs(depth, edges.with_normals(), &signs, uniform, |i, crossed, out| {
+        let samples = |i: usize, crossed: &[Plane; 3], out: &mut Vec<Sample>| {
             let (key, inside) = &signs[i];
             let nowhere = |_, _| unreachable!("without circulation, signs change at hits");
             push_samples(&hits, *key, inside, crossed, Rule::Nonzero, nowhere, out);
-        })
+        };
+        SignedOctree::try_from_signs(depth, edges.with_normals(), &signs, uniform, samples, progress)
     }
 }
 
