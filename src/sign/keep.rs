@@ -6,7 +6,7 @@
 use crate::error::{Error, Result};
 use crate::octree::components::{Component, Components, component_bytes};
 use crate::octree::signed::SignedOctree;
-use crate::progress::Progress;
+use crate::progress::{Progress, check};
 use std::cmp::Reverse;
 
 /// Which solids stay. Their size is the number of grid edges that their surfaces cross, as in `PolyMender`.
@@ -79,7 +79,7 @@ impl Keep {
 /// Cost: linear in bricks; that of [`Components`] for each of both.
 ///
 /// # Errors
-/// As [`Keep::check`], and `Memory` when `progress` says so.
+/// As [`Keep::check`]; `Cancelled`, and `Memory` when `progress` says so.
 pub fn keep(
     mut octree: SignedOctree,
     keep: Keep,
@@ -93,6 +93,7 @@ pub fn keep(
     }
     progress.hold(component_bytes(&octree) as u64)?;
     let components = Components::new(&octree);
+    check(progress)?;
     kept.solids = components.solids().count() as u64;
     kept.cavities = components.cavities().count() as u64;
     let drops = keep.drops(components.list());
@@ -102,13 +103,16 @@ pub fn keep(
     }
     if kept.dropped_solids > 0 {
         octree = components.without(|c| drops[c as usize]);
+        check(progress)?;
     }
     if kept.dropped_solids > 0 && kept.cavities > 0 {
         // Cavities may have gone with their solids, or have become one with another.
         kept.cavities = Components::new(&octree).cavities().count() as u64;
+        check(progress)?;
     }
     if drop_cavities && kept.cavities > 0 {
         let components = Components::new(&octree);
+        check(progress)?;
         kept.filled_cavities = kept.cavities;
         kept.filled_cells = components.cavities().map(|c| c.points).sum();
         let fills: Vec<bool> = components.list().iter().enumerate().map(|(i, c)| i > 0 && !c.is_inside).collect();

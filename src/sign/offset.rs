@@ -20,7 +20,7 @@ use crate::grid::{Axis, Key};
 use crate::mesh::TriangleSource;
 use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::signed::{GIVEN_BYTES, SignedOctree};
-use crate::progress::{Beside, Progress};
+use crate::progress::{Beside, Progress, check};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -98,7 +98,7 @@ pub fn offset(
     let nothing = SignedOctree::empty(frame.depth());
     let old = if matches!(offset, Offset::Shell(_)) { &nothing } else { octree };
     let moved = Moved { old, band: &band, distance };
-    Ok(moved.octree(with_normals))
+    moved.octree(with_normals, progress)
 }
 
 /// A surface and the distance to it.
@@ -110,7 +110,7 @@ struct Moved<'a> {
 }
 
 impl Moved<'_> {
-    fn octree(&self, with_normals: bool) -> SignedOctree {
+    fn octree(&self, with_normals: bool, progress: &dyn Progress) -> Result<SignedOctree> {
         let Moved { old, band, distance } = self;
         let (crossings, uniform) = (old.crossings(), old.uniform());
         let mut keys: Vec<Key> = crossings.bricks().iter().map(|brick| brick.key).chain(band.keys()).collect();
@@ -124,9 +124,10 @@ impl Moved<'_> {
         let after = |key: Key| {
             let near = band.within(key, distance.abs());
             let plane = if *distance >= 0.0 { before(key) | near } else { before(key) & !near };
-            (key, clipped(key, plane))
+            check(progress)?;
+            Ok((key, clipped(key, plane)))
         };
-        let signs: Vec<(Key, Plane)> = keys.into_par_iter().map(after).collect();
+        let signs = keys.into_par_iter().map(after).collect::<Result<Vec<(Key, Plane)>>>()?;
         let samples = |place: usize, crossed: &[Plane; 3], out: &mut Vec<Sample>| {
             let (key, inside) = signs[place];
             let origin = lattice_point(band.depth(), key);
@@ -145,7 +146,8 @@ impl Moved<'_> {
                 });
             });
         };
-        SignedOctree::from_signs(band.depth(), with_normals, &signs, |key| uniform.is_inside(key), samples)
+        let uniform = |key| uniform.is_inside(key);
+        SignedOctree::try_from_signs(band.depth(), with_normals, &signs, uniform, samples, progress)
     }
 
     /// Where the edge from a lattice point along an axis, whose ends were inside or not, has the distance; `None` where the band does not

@@ -25,7 +25,7 @@ use crate::octree::crossings::{Sample, lattice_point};
 use crate::octree::hits::OrientedHits;
 use crate::octree::point_set::PointSet;
 use crate::octree::signed::{GIVEN_BYTES, SignedOctree, Uniform};
-use crate::progress::{Beside, Progress};
+use crate::progress::{Beside, Progress, check};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -98,7 +98,7 @@ pub fn thicken(
     };
     let bricks = octree.crossings().bricks().len() + band.keys().len();
     beside.hold((octree.bytes() + band.bytes() + bricks * GIVEN_BYTES) as u64)?;
-    Ok(united(octree, &band, radius))
+    united(octree, &band, radius, progress)
 }
 
 /// Refuses walls that the grid cannot show.
@@ -160,7 +160,7 @@ pub(super) fn check_reach(option: &'static str, reach: f64, frame: &Frame) -> Re
 }
 
 /// The union of solids and a band of `radius` cells.
-pub(super) fn united(octree: &SignedOctree, band: &Band, radius: f64) -> SignedOctree {
+fn united(octree: &SignedOctree, band: &Band, radius: f64, progress: &dyn Progress) -> Result<SignedOctree> {
     let (crossings, depth) = (octree.crossings(), band.depth());
     let uniform = octree.uniform();
     let mut keys: Vec<Key> = crossings.bricks().iter().map(|b| b.key).chain(band.keys()).collect();
@@ -171,8 +171,11 @@ pub(super) fn united(octree: &SignedOctree, band: &Band, radius: f64) -> SignedO
         None if uniform.is_inside(key) => Plane::FULL,
         None => Plane::EMPTY,
     };
-    let signs: Vec<(Key, Plane)> =
-        keys.into_par_iter().map(|key| (key, before(key) | clipped(key, band.within(key, radius)))).collect();
+    let after = |key: Key| {
+        check(progress)?;
+        Ok((key, before(key) | clipped(key, band.within(key, radius))))
+    };
+    let signs = keys.into_par_iter().map(after).collect::<Result<Vec<(Key, Plane)>>>()?;
     let with_normals = crossings.with_normals();
     let samples = |place: usize, crossed: &[Plane; 3], out: &mut Vec<Sample>| {
         let (key, inside) = &signs[place];
@@ -199,7 +202,7 @@ pub(super) fn united(octree: &SignedOctree, band: &Band, radius: f64) -> SignedO
             });
         });
     };
-    SignedOctree::from_signs(depth, with_normals, &signs, |key| uniform.is_inside(key), samples)
+    SignedOctree::try_from_signs(depth, with_normals, &signs, |key| uniform.is_inside(key), samples, progress)
 }
 
 /// A sample at a part of an edge, with a normal of any length.
