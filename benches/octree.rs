@@ -120,21 +120,22 @@ fn resident() -> f64 {
 
 fn building(group: &mut BenchmarkGroup<'_, WallTime>) {
     group.throughput(Throughput::Elements(built().len() as u64));
-    group.bench_function("build, all threads", |b| b.iter(|| built().len()));
+    // Trees are dropped beside the clock, all of them.
+    group.bench_function("build, all threads", |b| b.iter_with_large_drop(built));
     group.bench_function("build, one thread", |b| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-        b.iter(|| pool.install(|| built().len()));
+        b.iter_with_large_drop(|| pool.install(built));
     });
     group.bench_function("build, leaf by leaf", |b| {
-        b.iter(|| {
+        b.iter_with_large_drop(|| {
             let mut tree = LinearOctree::from_iter([(Key::ROOT, 0)]);
             let split = |cell| tree.refine(cell, Balance::Off, |_, _| 0).map(|_| ()).expect("a leaf");
             descend(Key::ROOT, &mut { split }, &mut |_| ());
-            tree.len()
+            tree
         });
     });
     group.bench_function("build, leaf by leaf, in balance", |b| {
-        b.iter(|| {
+        b.iter_with_large_drop(|| {
             let mut tree = LinearOctree::from_iter([(Key::ROOT, 0)]);
             let split = |cell| {
                 if tree.contains(cell) {
@@ -142,23 +143,23 @@ fn building(group: &mut BenchmarkGroup<'_, WallTime>) {
                 }
             };
             descend(Key::ROOT, &mut { split }, &mut |_| ());
-            tree.len()
+            tree
         });
     });
-    group.bench_function("build, ordered map", |b| b.iter(|| ordered_map().len()));
+    group.bench_function("build, ordered map", |b| b.iter_with_large_drop(ordered_map));
     group.bench_function("build, hashbrown", |b| {
-        b.iter(|| {
+        b.iter_with_large_drop(|| {
             let mut map = hash_map();
             descend(Key::ROOT, &mut |_| (), &mut |leaf| *map.entry(leaf).or_insert(0) = 0);
-            map.len()
+            map
         });
     });
     group.bench_function("build, sorted array", |b| {
-        b.iter(|| {
+        b.iter_with_large_drop(|| {
             let mut leaves = Vec::new();
             descend(Key::ROOT, &mut |_| (), &mut |leaf| leaves.push((leaf, 0u64)));
             leaves.par_sort_unstable();
-            leaves.len()
+            leaves
         });
     });
     group.bench_function("balance across faces, edges, corners", |b| {

@@ -22,48 +22,58 @@ impl Cells {
     pub(crate) const EMPTY: Cells = Cells(0);
 
     /// One cell, 0 ..= 63.
+    #[inline]
     pub(crate) const fn one(place: u32) -> Cells {
         Cells(1 << place)
     }
 
     /// The cell and its seven siblings.
+    #[inline]
     pub(crate) const fn family(place: u32) -> Cells {
         Cells(0xff << (place & 0o70))
     }
 
     /// Those cells of a block of `level` that lie in the root: all 64 but on the first two levels.
+    #[inline]
     pub(crate) const fn of_level(level: u32) -> Cells {
         Cells([1, 0xff, !0][if level < 2 { level as usize } else { 2 }])
     }
 
+    #[inline]
     pub(crate) const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
+    #[inline]
     pub(crate) const fn has(self, place: u32) -> bool {
         self.0 >> place & 1 != 0
     }
 
     /// How many there are before a place.
+    #[inline]
     pub(crate) const fn rank(self, place: u32) -> usize {
         (self.0 & ((1 << place) - 1)).count_ones() as usize
     }
 
+    #[inline]
     pub(crate) const fn count(self) -> usize {
         self.0.count_ones() as usize
     }
 
     /// Their places, ascending.
+    #[inline]
     pub(crate) fn places(self) -> Bits {
         Bits(self.0)
     }
 
     /// The eight bits of the family at a place, bit 0 for the child at corner 0.
+    #[inline]
     pub(crate) const fn byte(self, place: u32) -> u8 {
         (self.0 >> (place & 0o70)) as u8
     }
 
     /// The neighbours across `face`: those in this block, and those in the next.
+    #[inline]
     pub(crate) const fn moved(self, face: Face) -> (Cells, Cells) {
         let axis = face.axis();
         // The cells in layers 0 ..= 3 along the axis lie `a`, `8 a - a` and `a` places apart.
@@ -107,6 +117,7 @@ impl Not for Cells {
 }
 
 /// The block `steps` (-1, 0 or 1 along each axis) from the block named `name`, by its name. `None` outside the root.
+#[inline]
 pub(crate) fn block_beside(name: Key, steps: [i32; 3]) -> Option<Key> {
     let side = 4 * i64::from(name.size());
     let min = name.min_corner();

@@ -84,6 +84,7 @@ impl Key {
     /// The cell of `level` at integer position `[i, j, k]`, counted in cells of that level from the origin.
     ///
     /// `None` if the level is above 18 or a position not below `2^level`.
+    #[inline]
     pub const fn cell(level: u32, [i, j, k]: [u32; 3]) -> Option<Key> {
         if level > MAX_LEVEL || (i | j | k) >> level != 0 {
             return None;
@@ -95,6 +96,7 @@ impl Key {
     /// The element with this centre, in lattice units, and this extent.
     ///
     /// `None` if no level has such an element inside the root cube.
+    #[inline]
     pub const fn element(centre: [u32; 3], extent: Extent) -> Option<Key> {
         let [x, y, z] = centre;
         if x > SIDE || y > SIDE || z > SIDE {
@@ -104,17 +106,20 @@ impl Key {
     }
 
     /// The lattice point with these coordinates, or `None` if one is above 2^19.
+    #[inline]
     pub const fn point(coordinates: [u32; 3]) -> Option<Key> {
         Key::element(coordinates, Extent::POINT)
     }
 
     /// The key with these bits, or `None` if they do not name an element inside the root cube.
+    #[inline]
     pub const fn from_bits(bits: u64) -> Option<Key> {
         let key = Key(bits);
         if key.is_valid() { Some(key) } else { None }
     }
 
     /// The packed form, laid out as the [module](self) says.
+    #[inline]
     pub const fn to_bits(self) -> u64 {
         self.0
     }
@@ -127,6 +132,7 @@ impl Key {
     /// in bits 60 and 61.
     ///
     /// `None` if there is no such element.
+    #[inline]
     pub const fn from_fields(fields: u64) -> Option<Key> {
         if fields >> 63 != 0 {
             return None;
@@ -137,6 +143,7 @@ impl Key {
     }
 
     /// To the plain layout read by [`from_fields`](Key::from_fields).
+    #[inline]
     pub const fn to_fields(self) -> u64 {
         let [x, y, z] = self.center();
         self.0 & !CODE | (x as u64) << 40 | (y as u64) << 20 | z as u64
@@ -144,6 +151,7 @@ impl Key {
 
     /// Whether this names an element inside the root cube. Always true of keys made by checked constructors, and of
     /// what arithmetic makes of valid keys within its domain.
+    #[inline]
     pub const fn is_valid(self) -> bool {
         if self.0 >> 63 != 0 {
             return false;
@@ -165,42 +173,50 @@ impl Key {
 /// What a key says about its element.
 impl Key {
     /// The axes along which the element extends.
+    #[inline]
     pub const fn dir(self) -> Extent {
         Extent::ALL[(self.0 >> EXTENT_SHIFT) as usize & 7]
     }
 
     /// Whether it is a cell.
+    #[inline]
     pub const fn is_cell(self) -> bool {
         self.0 >> EXTENT_SHIFT == Extent::CELL.bits() as u64
     }
 
     /// Whether it is a point.
+    #[inline]
     pub const fn is_point(self) -> bool {
         self.0 >> EXTENT_SHIFT == 0
     }
 
     /// The level of the cells of which it is a part of full size, 0 for the root and 18 for the finest. `None` for a
     /// point.
+    #[inline]
     pub const fn level(self) -> Option<u32> {
         if self.is_point() { None } else { Some(MAX_LEVEL - self.trailing()) }
     }
 
     /// The side in lattice units: `2^(19 - level)`, 0 for a point.
+    #[inline]
     pub const fn size(self) -> u32 {
         if self.is_point() { 0 } else { 2 << self.trailing() }
     }
 
     /// The coordinates of the centre in lattice units.
+    #[inline]
     pub const fn center(self) -> [u32; 3] {
         deinterleave(self.0)
     }
 
     /// The smallest coordinates of the closed element in lattice units.
+    #[inline]
     pub const fn min_corner(self) -> [u32; 3] {
         deinterleave(self.min_code())
     }
 
     /// The largest coordinates of the closed element in lattice units.
+    #[inline]
     pub const fn max_corner(self) -> [u32; 3] {
         let [x, y, z] = self.min_corner();
         let (dir, size) = (self.dir(), self.size());
@@ -212,17 +228,20 @@ impl Key {
     }
 
     /// The interleaved centre, below 2^60.
+    #[inline]
     pub const fn code(self) -> u64 {
         self.0 & CODE
     }
 
     /// Trailing zeros of the centre on the extended axes: 18 - level. Not for points.
+    #[inline]
     const fn trailing(self) -> u32 {
         debug_assert!(!self.is_point(), "a point has no level");
         (self.0 & FIELDS[self.dir().index()]).trailing_zeros() / 3
     }
 
     /// The interleaved smallest corner: the centre without its lowest bit on the extended axes.
+    #[inline]
     pub(crate) const fn min_code(self) -> u64 {
         if self.is_point() {
             return self.code();
@@ -234,6 +253,7 @@ impl Key {
 /// The tree: parent, child, ancestor. All of these are for cells.
 impl Key {
     /// The cell that was split to give this one, or `None` for the root. Domain: cells.
+    #[inline]
     pub const fn parent(self) -> Option<Key> {
         let low = self.lowest();
         if low == 1 << (3 * MAX_LEVEL) { None } else { Some(Key((self.0 & !(64 * low - 1)) | (56 * low))) }
@@ -241,6 +261,7 @@ impl Key {
 
     /// The child at a corner. Domain: cells above level 18.
     #[must_use]
+    #[inline]
     pub const fn child(self, corner: Corner) -> Key {
         let low = self.lowest();
         debug_assert!(low > 1, "a cell of level 18 has no children");
@@ -248,17 +269,20 @@ impl Key {
     }
 
     /// The eight children by corner. Domain: cells above level 18.
+    #[inline]
     pub fn children(self) -> [Key; 8] {
         Corner::ALL.map(|corner| self.child(corner))
     }
 
     /// Which child of its parent this is. Domain: cells; the root gives corner 0.
+    #[inline]
     pub const fn corner_in_parent(self) -> Corner {
         Corner::ALL[(self.code() >> (3 * (self.trailing() + 1))) as usize & 7]
     }
 
     /// The cell of `level` that holds this one: itself at its own level. Domain: cells, and levels up to its own.
     #[must_use]
+    #[inline]
     pub const fn ancestor(self, level: u32) -> Key {
         debug_assert!(self.is_cell() && level <= MAX_LEVEL - self.trailing(), "an ancestor is not finer");
         Key::around(self.code(), level)
@@ -268,6 +292,7 @@ impl Key {
     /// its low faces but not its high ones.
     ///
     /// `None` if a coordinate is above 2^19 - 1 or the level above 18.
+    #[inline]
     pub const fn holding([x, y, z]: [u32; 3], level: u32) -> Option<Key> {
         if (x | y | z) >= SIDE || level > MAX_LEVEL {
             return None;
@@ -276,18 +301,21 @@ impl Key {
     }
 
     /// The cell of `level` around an interleaved point of the half-open root.
+    #[inline]
     pub(crate) const fn around(code: u64, level: u32) -> Key {
         let low = 1 << (3 * (MAX_LEVEL - level));
         Key(CELL | (code & !(8 * low - 1)) | (7 * low))
     }
 
     /// The interleaved lattice point of a cell, in the half-open sense, next to one of its corners. Domain: cells.
+    #[inline]
     pub(crate) const fn code_inside(self, corner: Corner) -> u64 {
         let below = 8 * self.lowest() - 1;
         self.min_code() | FIELDS[corner.bits() as usize] & below
     }
 
     /// The element of a level with this extent whose least corner has the code `start`, which lies in the root and on the level's grid.
+    #[inline]
     pub(crate) const fn starting_at(start: u64, extent: Extent, level: u32) -> Key {
         let half = 7 << (3 * (MAX_LEVEL - level));
         Key((extent.bits() as u64) << EXTENT_SHIFT | start | FIELDS[extent.bits() as usize] & half)
@@ -303,6 +331,7 @@ impl Key {
     /// assert_eq!(a.common_ancestor(a), a);
     /// ```
     #[must_use]
+    #[inline]
     pub const fn common_ancestor(self, other: Key) -> Key {
         // Cells of level l agree with the cells inside them in every coordinate bit above bit t = 18 - l.
         let coarser = if self.trailing() > other.trailing() { self.trailing() } else { other.trailing() };
@@ -313,6 +342,7 @@ impl Key {
 
     /// Whether this cell, its boundary included, holds the whole of `other`, which may be an element of any kind. A
     /// cell contains itself. Domain of `self`: cells.
+    #[inline]
     pub fn contains(self, other: Key) -> bool {
         if other.is_cell() {
             let low = self.lowest();
@@ -336,6 +366,7 @@ impl Key {
     /// cells.sort(); // the order of keys puts a cell before its last child, but after the first seven
     /// assert_eq!(cells, [first, Key::ROOT, last]);
     /// ```
+    #[inline]
     pub const fn depth_first_rank(self) -> u64 {
         debug_assert!(self.is_cell(), "only cells have a place in the tree");
         self.min_code() << 5 | (MAX_LEVEL - self.trailing()) as u64

@@ -102,7 +102,7 @@ impl Mesh {
         options: DistanceOptions,
         progress: &dyn Progress,
     ) -> Result<Option<Distances>> {
-        let (a, b) = (TriangleTree::new(self), TriangleTree::new(other));
+        let (a, b) = (TriangleTree::try_new(self, progress)?, TriangleTree::try_new(other, progress)?);
         if a.is_empty() || b.is_empty() {
             return Ok(None);
         }

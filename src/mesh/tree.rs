@@ -21,9 +21,10 @@
 
 use super::meet::has_area;
 use super::{Bounds, Mesh, triangulate};
+use crate::error::Result;
 use crate::geom::triangle::closest_on;
 use crate::parallel::{in_order, pieces};
-use crate::progress::Silent;
+use crate::progress::{Progress, Silent, check};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -92,16 +93,25 @@ struct Item {
 impl<'a> TriangleTree<'a> {
     /// Makes the tree, on all threads. O(n log n).
     pub fn new(mesh: &'a Mesh) -> Self {
+        Self::try_new(mesh, &Silent).expect("it is not cancelled")
+    }
+
+    /// [`new`](Self::new), until `progress` says that it is cancelled.
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub fn try_new(mesh: &'a Mesh, progress: &dyn Progress) -> Result<Self> {
         let (points, scale) = scaled(&mesh.points);
         let mut items = items(mesh, &points);
         let height = items.len().div_ceil(LEAF).max(1).next_power_of_two().trailing_zeros();
         let n = items.len();
-        sort(&mut items, Node::ROOT, n, height);
+        sort(&mut items, Node::ROOT, n, height, progress);
+        check(progress)?;
         let (corners, faces) = items.iter().map(|item| (item.corners, item.face)).unzip();
         drop(items);
         let mut tree = TriangleTree { points, scale, corners, faces, boxes: Vec::new(), height };
         tree.boxes = tree.make_boxes();
-        tree
+        Ok(tree)
     }
 
     /// Number of triangles.
@@ -290,9 +300,10 @@ fn items(mesh: &Mesh, points: &[DVec3]) -> Vec<Item> {
     items
 }
 
-/// Sorts the triangles of a node, of `n` in all, into its leaves.
-fn sort(items: &mut [Item], node: Node, n: usize, height: u32) {
-    if node.level == height {
+/// Sorts the triangles of a node, of `n` in all, into its leaves. Leaves them as they are once it is cancelled.
+fn sort(items: &mut [Item], node: Node, n: usize, height: u32, progress: &dyn Progress) {
+    let is_large = n >> node.level > ALONE;
+    if node.level == height || is_large && progress.is_cancelled() {
         return;
     }
     let first = items[0].center;
@@ -302,8 +313,9 @@ fn sort(items: &mut [Item], node: Node, n: usize, height: u32) {
     let middle = children[0].range(n).len();
     items.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
     let (left, right) = items.split_at_mut(middle);
-    let mut halves = (|| sort(left, children[0], n, height), || sort(right, children[1], n, height));
-    if n >> node.level > ALONE {
+    let mut halves =
+        (|| sort(left, children[0], n, height, progress), || sort(right, children[1], n, height, progress));
+    if is_large {
         rayon::join(halves.0, halves.1);
     } else {
         halves.0();

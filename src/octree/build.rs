@@ -114,11 +114,15 @@ impl<S: Fn(Key) -> bool, R> Grower<'_, S, R> {
     where
         R: Fn(Key) -> T,
     {
+        if name.level() == Some(self.max_level) {
+            let mut records = Vec::with_capacity(cells.count());
+            records.extend(cells.places().map(|place| (self.record)(name.in_block(place))));
+            return (name, Block { leaves: cells, refined: Cells::EMPTY, records });
+        }
         let (mut leaves, mut refined) = (Cells::EMPTY, Cells::EMPTY);
-        let may_split = name.level() < Some(self.max_level);
         for place in cells.places() {
             let cell = name.in_block(place);
-            if may_split && (self.split)(cell) {
+            if (self.split)(cell) {
                 refined |= Cells::one(place);
             } else {
                 leaves |= Cells::one(place);

@@ -32,6 +32,7 @@ impl Coarse {
     }
 
     /// The levels that the leaf at an interleaved point may have.
+    #[inline]
     fn levels(&self, code: u64) -> u32 {
         match self.cells[(code >> self.shift) as usize] {
             FINER => self.finer,
@@ -141,12 +142,14 @@ impl<T> LinearOctree<T> {
 }
 
 /// A level half-way between the coarsest and the finest of a set, if it is not empty.
+#[inline]
 fn middle(levels: u32) -> Option<u32> {
     let half = u32::midpoint(levels.trailing_zeros(), levels.checked_ilog2()?);
     Some((levels & ((2 << half) - 1)).ilog2())
 }
 
 /// The interleaved coordinates, with those on the high faces of the root moved inside. `None` outside the root.
+#[inline]
 pub(super) fn code_of(point: [u32; 3]) -> Option<u64> {
     point.iter().all(|&x| x <= SIDE).then(|| interleave(point.map(|x| x.min(SIDE - 1))))
 }

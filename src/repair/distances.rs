@@ -80,7 +80,7 @@ impl Solid {
     pub fn distance_field(&self, surface: Surface, adapt: Adapt, progress: &dyn Progress) -> Result<Field> {
         let mesh = self.surface_mesh(surface, progress)?;
         progress.begin(Stage::Measure, 0);
-        Field::build(self.frame, &self.distance_from(&mesh), adapt, progress)
+        Field::build(self.frame, &self.distance_from(&mesh, progress)?, adapt, progress)
     }
 
     /// The cells of a body and of what is around it, with levels, sides and distances.
@@ -126,7 +126,7 @@ impl Solid {
         let side = (1usize << level) + 1;
         let step = self.frame.cell_size() * f64::from(1u32 << (depth - level));
         progress.hold((side.pow(3) * (size_of::<f32>() + size_of::<f64>())) as u64)?;
-        let distance = self.distance_from(&mesh);
+        let distance = self.distance_from(&mesh, progress)?;
         progress.begin(Stage::Measure, (side * side) as u64);
         let rows = (0..side * side).into_par_iter().map(|row| {
             check(progress)?;
@@ -158,13 +158,14 @@ impl Solid {
         Ok(mesh)
     }
 
-    fn distance_from<'a>(&'a self, mesh: &'a Mesh) -> Distance<'a> {
-        Distance { tree: TriangleTree::new(mesh), signs: Signs::new(self.signed()), frame: &self.frame }
+    fn distance_from<'a>(&'a self, mesh: &'a Mesh, progress: &dyn Progress) -> Result<Distance<'a>> {
+        let tree = TriangleTree::try_new(mesh, progress)?;
+        Ok(Distance { tree, signs: Signs::new(self.signed()), frame: &self.frame })
     }
 
     /// The distances of lattice points.
     fn distances(&self, mesh: &Mesh, points: &[DVec3], progress: &dyn Progress) -> Result<Vec<f64>> {
-        let distance = self.distance_from(mesh);
+        let distance = self.distance_from(mesh, progress)?;
         progress.begin(Stage::Measure, points.len() as u64);
         let batches = points.par_chunks(BATCH).map(|points| {
             check(progress)?;
