@@ -340,8 +340,10 @@ fn distance_squared(bounds: &Bounds, p: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
     use crate::mesh::chance::Chance;
     use crate::mesh::sample;
+    use std::sync::atomic::{AtomicU32, Ordering};
 
     /// Distance to a triangle by another way: the least over a fine fan of points would never be exact, so by
     /// barycentric cases.
@@ -450,6 +452,28 @@ mod tests {
         let leaves = 1u32 << tree.height();
         let small = (leaves..2 * leaves).filter(|&leaf| tree.bounds(leaf).extent().max_element() < 1.0).count();
         assert!(small as u32 >= leaves - 8, "{small} of {leaves}");
+    }
+
+    #[test]
+    fn a_tree_is_not_made_once_cancelled() {
+        /// Is cancelled from a number of looks on.
+        struct Looks(AtomicU32, u32);
+        impl Progress for Looks {
+            fn is_cancelled(&self) -> bool {
+                self.0.fetch_add(1, Ordering::Relaxed) >= self.1
+            }
+        }
+        let mesh = sample::build("knot", 6).unwrap();
+        let whole = Looks(AtomicU32::new(0), u32::MAX);
+        assert!(TriangleTree::try_new(&mesh, &whole).is_ok());
+        let looks = whole.0.into_inner();
+        assert!(looks > 20, "{looks}");
+        for after in [0, 1, 5] {
+            let stopped = Looks(AtomicU32::new(0), after);
+            assert!(matches!(TriangleTree::try_new(&mesh, &stopped), Err(Error::Cancelled)));
+            // Each of those before it has begun two halves; the last look is that for the result.
+            assert!(stopped.0.into_inner() <= 2 * after + 2);
+        }
     }
 
     #[test]
