@@ -268,6 +268,10 @@ fn octree(criterion: &mut Criterion) {
             let mut rounds = rounds(points);
             b.iter(|| next(&mut rounds).iter().map(|&p| found(tree.locate(p))).sum::<u64>());
         });
+        group.bench_function(format!("leaf search, {place}, at once"), |b| {
+            let mut rounds = rounds(points);
+            b.iter(|| tree.locate_all(next(&mut rounds).iter().copied()).map(found).sum::<u64>());
+        });
         group.bench_function(format!("leaf search, {place}, hashbrown"), |b| {
             let mut rounds = rounds(points);
             b.iter(|| next(&mut rounds).iter().filter_map(|&p| in_hash_map(p)).map(|r| r & 1).sum::<u64>());

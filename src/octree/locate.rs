@@ -49,8 +49,9 @@ impl Coarse {
 ///
 /// A probe tells of a cell whether it is a leaf, has leaves inside, or lies in a larger leaf or nowhere. So the level of the leaf at a
 /// point is found by bisection of the levels that have leaves, after a look at the finest, where most leaves are: at most 6 probes, and
-/// those of coarse levels hit few blocks, which are in the cache. Large trees that were built at once, or shrunk, know what their coarse cells have, until a leaf
-/// changes: then one probe finds a large leaf, and others are searched among the finer levels only. The table takes an eighth of a byte a leaf.
+/// those of coarse levels hit few blocks, which are in the cache. Large trees that were built at once, or shrunk, know what their coarse
+/// cells have, until a leaf changes: then one probe finds a large leaf, and others are searched among the finer levels only. The table
+/// takes an eighth of a byte a leaf.
 impl<T> LinearOctree<T> {
     /// The leaf that holds a point given in lattice coordinates, 0 ..= 2^19, with its record.
     ///
@@ -67,11 +68,16 @@ impl<T> LinearOctree<T> {
     /// assert_eq!(tree.locate([1, 2, u32::MAX]), None);
     /// ```
     pub fn locate(&self, point: [u32; 3]) -> Option<(Key, &T)> {
-        let (code, mut levels) = (code_of(point)?, self.levels.occupied);
-        if let Some(coarse) = &self.levels.coarse {
-            levels &= coarse.levels(code);
-        }
-        self.search(code, levels, levels.checked_ilog2()?)
+        self.complete(self.search_at(point)?)
+    }
+
+    /// How to search for the leaf at a point.
+    #[inline]
+    pub(super) fn search_at(&self, point: [u32; 3]) -> Option<Search> {
+        let code = code_of(point)?;
+        let ahead = self.levels.coarse.as_ref().map_or(!0, |coarse| coarse.levels(code));
+        let levels = self.levels.occupied & ahead;
+        Some(Search::new(code, levels, levels.checked_ilog2()?))
     }
 
     /// Looks up what the coarse levels have, if there are so many leaves that it costs little beside them.
@@ -118,26 +124,69 @@ impl<T> LinearOctree<T> {
         self.search(cell.code(), self.levels.occupied & ((2 << level) - 1), level)
     }
 
-    /// The leaf around an interleaved point of the half-open root, among those of `levels`; `level` is the most likely. Looks there,
-    /// then bisects; but where it is not the finest, at the next level in the direction the answer gives first.
-    pub(super) fn search(&self, code: u64, mut levels: u32, mut level: u32) -> Option<(Key, &T)> {
-        let mut is_first = levels >> level > 1;
+    /// The leaf around an interleaved point of the half-open root, among those of `levels`; `level` is the most likely.
+    #[inline]
+    pub(super) fn search(&self, code: u64, levels: u32, level: u32) -> Option<(Key, &T)> {
+        self.complete(Search::new(code, levels, level))
+    }
+
+    #[inline]
+    fn complete(&self, mut search: Search) -> Option<(Key, &T)> {
         loop {
-            let cell = Key::around(code, level);
-            let finer = match self.state(cell) {
+            let cell = search.cell();
+            let is_finer = match self.state(cell) {
                 CellState::Leaf(record) => return Some((cell, record)),
                 CellState::Refined => true,
                 CellState::Absent => false,
             };
-            let below = (2 << level) - 1;
-            levels &= if finer { !below } else { below >> 1 };
-            level = match (is_first, finer) {
-                (true, true) if levels != 0 => levels.trailing_zeros(),
-                (true, false) => levels.checked_ilog2()?,
-                _ => middle(levels)?,
-            };
-            is_first = false;
+            if !search.narrow(is_finer) {
+                return None;
+            }
         }
+    }
+}
+
+/// A search that goes on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Search {
+    /// The interleaved point.
+    code: u64,
+    /// The levels that its leaf may have.
+    levels: u32,
+    /// The level to look at.
+    level: u32,
+    is_first: bool,
+}
+
+impl Search {
+    /// A search for nothing.
+    pub(super) const IDLE: Search = Search { code: 0, levels: 0, level: 0, is_first: false };
+
+    /// Looks at a level, then bisects `levels`; but where that level is not the finest, looks at the next one in the direction the
+    /// answer gives first.
+    #[inline]
+    fn new(code: u64, levels: u32, level: u32) -> Self {
+        Search { code, levels, level, is_first: levels >> level > 1 }
+    }
+
+    /// The cell to look at.
+    #[inline]
+    pub(super) fn cell(&self) -> Key {
+        Key::around(self.code, self.level)
+    }
+
+    /// Goes on among the levels finer or coarser than the cell. False if none is left.
+    #[inline]
+    pub(super) fn narrow(&mut self, is_finer: bool) -> bool {
+        let below = (2 << self.level) - 1;
+        self.levels &= if is_finer { !below } else { below >> 1 };
+        let next = match (std::mem::take(&mut self.is_first), is_finer) {
+            (true, true) if self.levels != 0 => Some(self.levels.trailing_zeros()),
+            (true, false) => self.levels.checked_ilog2(),
+            _ => middle(self.levels),
+        };
+        self.level = next.unwrap_or(self.level);
+        next.is_some()
     }
 }
 
@@ -182,6 +231,14 @@ mod tests {
                 hint = found.map_or(hint, |(leaf, _)| leaf);
             }
             prop_assert_eq!(tree.locate([0, SIDE + 1, 0]), None);
+            // All at once, more than are taken at a time, some outside.
+            let outside = (0..40).map(|i| [i, SIDE + i % 2, 0]);
+            let all: Vec<[u32; 3]> = outside.chain(tree.iter().map(|(leaf, _)| leaf.center())).collect();
+            let mut at_once = tree.locate_all(all.iter().copied());
+            prop_assert_eq!(at_once.len(), all.len());
+            prop_assert!(at_once.by_ref().take(33).eq(all[..33].iter().map(|&p| tree.locate(p))));
+            prop_assert_eq!(at_once.len(), all.len() - 33);
+            prop_assert!(at_once.eq(all[33..].iter().map(|&p| tree.locate(p))));
             // What was looked up holds until a leaf changes.
             if let Some(leaf) = tree.keys_z().first().copied() {
                 tree.remove(leaf);

@@ -8,7 +8,7 @@
 //! | to | there is |
 //! |---|---|
 //! | make and change trees | [`insert`](LinearOctree::insert), [`build`](LinearOctree::build), [`refine`](LinearOctree::refine), [`coarsen`](LinearOctree::coarsen), [`balance`](LinearOctree::balance), [`of_points`](LinearOctree::of_points) |
-//! | find leaves | [`locate`](LinearOctree::locate), [`leaves_in_box`](LinearOctree::leaves_in_box), [`leaves_within`](LinearOctree::leaves_within), [`along_ray`](LinearOctree::along_ray), [`around`](LinearOctree::around), [`neighbours`](LinearOctree::neighbours) |
+//! | find leaves | [`locate`](LinearOctree::locate), [`locate_all`](LinearOctree::locate_all), [`leaves_in_box`](LinearOctree::leaves_in_box), [`leaves_within`](LinearOctree::leaves_within), [`along_ray`](LinearOctree::along_ray), [`around`](LinearOctree::around), [`neighbours`](LinearOctree::neighbours) |
 //! | go through all | [`iter_z`](LinearOctree::iter_z), [`iter_by_level`](LinearOctree::iter_by_level), [`par_iter_z`](LinearOctree::par_iter_z), [`visit_dual`](LinearOctree::visit_dual), [`face_regions`](LinearOctree::face_regions) |
 //! | have values at corners | [`NodalOctree`] |
 //! | keep | [`to_bytes`](LinearOctree::to_bytes), [`from_bytes`](LinearOctree::from_bytes), and `serde` with the feature of that name |
@@ -42,6 +42,7 @@ pub mod edited;
 mod face_regions;
 pub mod hits;
 mod locate;
+mod locate_all;
 mod neighbour;
 pub mod nodes;
 #[cfg(test)]
@@ -72,6 +73,7 @@ pub use crossings::Crossings;
 pub use dual::{Dual, DualPiece};
 pub use edited::EditedOctree;
 pub use hits::OrientedHits;
+pub use locate_all::LocateAll;
 pub use neighbour::Neighbours;
 pub use nodes::NodalOctree;
 pub use points::{CellPoints, StoredPoints};
