@@ -58,6 +58,7 @@
 //! ```
 
 mod betti;
+mod collapse;
 mod complex;
 mod conform;
 mod flow;
