@@ -5,19 +5,19 @@
 //! where it does and the other one step lower. All is done to 256 elements of a kind at a time, in registers of 128 bits, or of 256 where
 //! the library is compiled for processors that have them (`wide`).
 //!
-//! A brick keeps the planes of those kinds only that are marked, two of seven on average, and says along which axes they have their coface,
+//! A brick keeps the planes of those kinds only that are marked, and says along which axes they have their coface,
 //! so that only these pairs of extents are looked at again.
 //!
 //! # Cost
 //!
-//! Some 1,600 instructions to find the marks of a brick, 1,400 to choose, 270 for each pair of extents of which something goes.
+//! Some 1,600 instructions to find the marks of a brick, and as many to choose.
 
 use super::complex::{Brick, Complex, Planes, Record};
 use crate::grid::brick::{Bits, Plane};
 use crate::grid::{Axis, Extent, Face};
 use wide::u64x4;
 
-/// The pairs of extents that collapse, as lower extent, axis that the upper one has beside, and number of the pair.
+/// The pairs of extents that collapse, as lower extent and axis that the upper one has beside.
 pub(super) const PAIRS: [(Extent, Axis); 12] = {
     let mut pairs = [(Extent::POINT, Axis::X); 12];
     let (mut n, mut extent) = (0, 0);
@@ -224,7 +224,6 @@ impl Found {
     /// Everything a few words at a time, so that it stays in registers: some 170 operations, and a few where nothing is left or all cells
     /// are.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "called in one place, and most of it is known for each x")]
     fn once_covered(&mut self, live: &Planes, low: [&Planes; 3], x: usize) {
         use Axis::{X, Y, Z};
         let here = |extent: Extent| words(&live[extent.index()], x);
