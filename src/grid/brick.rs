@@ -86,7 +86,7 @@ impl Local {
 pub struct Plane(pub [u64; 8]);
 
 /// Bits with z = 0 of a word.
-const Z0: u64 = 0x0101_0101_0101_0101;
+pub(crate) const Z0: u64 = 0x0101_0101_0101_0101;
 /// Bits with y = 0 of a word.
 const Y0: u64 = 0xff;
 

@@ -134,13 +134,10 @@ impl<T> LinearOctree<T> {
     fn complete(&self, mut search: Search) -> Option<(Key, &T)> {
         loop {
             let cell = search.cell();
-            let is_finer = match self.state(cell) {
+            match self.state(cell) {
                 CellState::Leaf(record) => return Some((cell, record)),
-                CellState::Refined => true,
-                CellState::Absent => false,
-            };
-            if !search.narrow(is_finer) {
-                return None;
+                other if search.narrow(other.is_refined()) => {}
+                _ => return None,
             }
         }
     }

@@ -75,17 +75,13 @@ impl<T, P: Iterator<Item = [u32; 3]>> LocateAll<'_, T, P> {
             let mut left = 0;
             for at in 0..count {
                 let i = open[at];
-                let is_finer = match seen[at].map_or(CellState::Absent, |(block, place)| block.state(place)) {
-                    CellState::Leaf(record) => {
-                        self.found[i] = Some((searches[i].cell(), record));
-                        continue;
+                match seen[at].map_or(CellState::Absent, |(block, place)| block.state(place)) {
+                    CellState::Leaf(record) => self.found[i] = Some((searches[i].cell(), record)),
+                    other if searches[i].narrow(other.is_refined()) => {
+                        open[left] = i;
+                        left += 1;
                     }
-                    CellState::Refined => true,
-                    CellState::Absent => false,
-                };
-                if searches[i].narrow(is_finer) {
-                    open[left] = i;
-                    left += 1;
+                    _ => {}
                 }
             }
             count = left;

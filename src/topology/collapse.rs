@@ -13,7 +13,7 @@
 //! Some 1,600 instructions to find the marks of a brick, and as many to choose.
 
 use super::complex::{Brick, Complex, Planes, Record};
-use crate::grid::brick::{Bits, Plane};
+use crate::grid::brick::{Bits, Plane, Z0};
 use crate::grid::{Axis, Extent, Face};
 use wide::u64x4;
 
@@ -272,9 +272,6 @@ fn along(live: &Planes, low: [&Planes; 3], x: usize, upper: Extent, axis: Axis) 
     };
     (above ^ below, above & below)
 }
-
-/// Bits with z = 0 of a word of a plane.
-const Z0: u64 = 0x0101_0101_0101_0101;
 
 /// What was chosen in the layers next to the high neighbours and has its lower part there.
 #[derive(Clone)]

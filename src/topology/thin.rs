@@ -83,7 +83,7 @@ pub fn thin(complex: &mut Complex, layers: Option<u32>, progress: &dyn Progress)
         if done.steps.is_multiple_of(8) {
             progress.hold((complex.bytes() + step.bytes()) as u64)?;
         }
-        if step.marks().all(|marks| marks.is_empty() && !marks.waiting) {
+        if all_of(&step.marked).all(|marks| marks.is_empty() && !marks.waiting) {
             // Bricks that were opened were full.
             let opened = complex.bricks.len() - listed;
             done.removed = (before + opened as u64 * 4096).saturating_sub(complex.count());
@@ -161,8 +161,10 @@ struct Step {
 }
 
 impl Step {
-    fn marks(&self) -> impl Iterator<Item = &Marks> {
-        self.marked.iter().flat_map(|group| &group.bricks)
+    /// The place of a brick in the list that `place_of` is about, if it is in there.
+    fn place(&self, brick: u32) -> Option<usize> {
+        let place = if brick < DEEP { self.place_of[brick as usize] } else { NO_PLACE };
+        (place != NO_PLACE).then_some(place as usize)
     }
 
     /// Bytes held.
@@ -175,11 +177,7 @@ impl Step {
 
     /// The marks of a brick.
     fn marks_of(&self, brick: u32) -> MarksOf<'_> {
-        let place = if brick < DEEP { self.place_of[brick as usize] } else { NO_PLACE };
-        if place == NO_PLACE {
-            return MarksOf::NONE;
-        }
-        self.marked[place as usize / GRAIN].of(place as usize % GRAIN)
+        self.place(brick).map_or(MarksOf::NONE, |place| self.marked[place / GRAIN].of(place % GRAIN))
     }
 
     /// Finds the marks of some bricks.
@@ -194,7 +192,7 @@ impl Step {
 
     /// Opens the bricks in which something may be chosen, and lists them.
     fn list_uppers(&mut self, complex: &mut Complex) {
-        for marks in self.marked.iter().flat_map(|group| &group.bricks).filter(|marks| !marks.is_empty()) {
+        for marks in all_of(&self.marked).filter(|marks| !marks.is_empty()) {
             self.places.insert(marks.brick);
             for axis in Axis::ALL.into_iter().filter(|&axis| marks.is_beside(axis)) {
                 if let Some(beside) = complex.open(marks.brick, Face::new(axis, false)) {
@@ -209,7 +207,7 @@ impl Step {
     /// Takes all pairs away; `active` becomes the bricks to look at in the next step.
     fn run(&mut self, complex: &mut Complex, active: &mut Vec<u32>) {
         self.list_uppers(complex);
-        for (place, marks) in (0..).zip(self.marked.iter().flat_map(|group| &group.bricks)) {
+        for (place, marks) in (0..).zip(all_of(&self.marked)) {
             self.place_of[marks.brick as usize] = place;
         }
         let mut work = taken(&mut complex.bricks, &self.uppers);
@@ -222,7 +220,7 @@ impl Step {
             work.lost = work.brick.choose(self.marks_of(work.place), high, carries);
         });
         // The marks are done with: now the table says where the carries of a brick are.
-        for marks in self.marked.iter().flat_map(|group| &group.bricks) {
+        for marks in all_of(&self.marked) {
             self.place_of[marks.brick as usize] = NO_PLACE;
             if marks.waiting {
                 // Faces whose turn has not come yet are waited for.
@@ -231,10 +229,7 @@ impl Step {
         }
         (0..).zip(&self.uppers).for_each(|(i, &upper)| self.place_of[upper as usize] = i);
         work.par_iter_mut().with_min_len(GRAIN).for_each(|work| {
-            let carried = |low: u32| {
-                let place = if low < DEEP { self.place_of[low as usize] } else { NO_PLACE };
-                (place != NO_PLACE).then(|| &carries[place as usize])
-            };
+            let carried = |low| self.place(low).map(|place| &carries[place]);
             let [x, _, y, _, z, _] = work.brick.around;
             work.brick.finish([carried(x), carried(y), carried(z)], &mut work.lost);
         });
@@ -252,6 +247,11 @@ impl Step {
         }
         self.places.drain_into(active);
     }
+}
+
+/// The marks of all groups.
+fn all_of(marked: &[Marked]) -> impl Iterator<Item = &Marks> {
+    marked.iter().flat_map(|group| &group.bricks)
 }
 
 /// Some of the bricks, given in order.
