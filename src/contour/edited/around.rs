@@ -5,6 +5,7 @@ use super::touched::{At, TouchedCell};
 use crate::contour::layout::slot;
 use crate::grid::Corner;
 use crate::grid::brick::Bits;
+use std::cmp::Ordering;
 
 /// Cells a side: a brick and a layer on both sides.
 const SIDE: usize = 10;
@@ -30,19 +31,47 @@ const FOUND: u16 = u16::MAX;
 const UNTOUCHED: u32 = u32::MAX;
 const EMPTY: Entry = Entry { place: UNTOUCHED, cell: TouchedCell { first: 0, shape: 0, signs: 0 } };
 
+/// A set of cells of the table: rows along z, a bit a cell.
+struct Cells([u16; SIDE * SIDE]);
+
+impl Cells {
+    const NONE: Cells = Cells([0; SIDE * SIDE]);
+
+    #[inline]
+    fn insert(&mut self, index: usize) {
+        self.0[index / SIDE] |= 1 << (index % SIDE);
+    }
+
+    /// Those of the 27 cells round one of the brick that are in the set, in the order of the steps to them.
+    #[inline]
+    fn round(&self, index: usize) -> u32 {
+        let (row, low) = (index / SIDE, index % SIDE - 1);
+        let plane = |x: usize| {
+            let first = row + SIDE * x - SIDE - 1;
+            let rows = self.0[first..first + 3].iter().rev();
+            rows.fold(0, |bits, &row| bits << 3 | u32::from(row >> low & 7))
+        };
+        plane(0) | plane(1) << 9 | plane(2) << 18
+    }
+}
+
 /// The touched cells of a brick and round it.
 pub(super) struct Around<'a> {
     patch: &'a Patch<'a>,
     /// The brick, in bricks.
     brick: At,
     entries: Box<[Entry; SIDE.pow(3)]>,
+    /// The touched cells of the brick itself, and those of bricks that come before it in the list.
+    own: Cells,
+    earlier: Cells,
     /// The places in the octree of the brick and those round it, as far as somebody has asked.
     places: [u32; 27],
 }
 
 impl<'a> Around<'a> {
     pub(super) fn new(patch: &'a Patch<'a>) -> Self {
-        Around { patch, brick: [0; 3], entries: Box::new([EMPTY; SIDE.pow(3)]), places: [UNTOUCHED; 27] }
+        let entries = Box::new([EMPTY; SIDE.pow(3)]);
+        Around { patch, brick: [0; 3], entries, own: Cells::NONE, earlier: Cells::NONE, places: [UNTOUCHED; 27] }
     }
 
     /// Looks up all cells round a brick. Cost: 27 hash probes, 0.3 us for the table, and 2 ns a touched cell.
@@ -53,9 +82,15 @@ impl<'a> Around<'a> {
         let touched = self.patch.touched;
         self.brick = touched.bricks[brick].at;
         self.entries.fill(EMPTY);
+        (self.own, self.earlier) = (Cells::NONE, Cells::NONE);
         self.places = [UNTOUCHED; 27];
         for (steps, place) in touched.around(brick) {
             let beside = &touched.bricks[place];
+            let mut set = match place.cmp(&brick) {
+                Ordering::Less => Some(&mut self.earlier),
+                Ordering::Equal => Some(&mut self.own),
+                Ordering::Greater => None,
+            };
             let bits = Y[(steps[1] + 1) as usize] & Z[(steps[2] + 1) as usize];
             let words = [7..8, 0..8, 0..1][(steps[0] + 1) as usize].clone();
             // A neighbour's last layer comes to stand at 0, the brick's first at 1.
@@ -65,8 +100,11 @@ impl<'a> Around<'a> {
                 if words.contains(&x) {
                     for b in Bits(word & bits) {
                         let place = before + (word & ((1 << b) - 1)).count_ones();
-                        let at = start + steps_in_table([x as i32, b as i32 >> 3, b as i32 & 7]);
-                        self.entries[at as usize] = Entry { place, cell: touched.cells[place as usize] };
+                        let index = (start + steps_in_table([x as i32, b as i32 >> 3, b as i32 & 7])) as usize;
+                        self.entries[index] = Entry { place, cell: touched.cells[place as usize] };
+                        if let Some(set) = &mut set {
+                            set.insert(index);
+                        }
                     }
                 }
                 before += word.count_ones();
@@ -79,10 +117,13 @@ impl<'a> Around<'a> {
         steps_in_table(std::array::from_fn(|a| at[a] - 8 * self.brick[a] + 1)) as usize
     }
 
-    /// Whether the cell comes before a touched one in the list.
+    /// Those of the 27 cells round one of the brick's that are touched and come before it in the list, as bits in the order of the steps
+    /// to them.
     #[inline]
-    pub(super) fn is_before(&self, index: usize, place: usize) -> bool {
-        (self.entries[index].place as usize) < place
+    pub(super) fn before(&self, index: usize) -> u32 {
+        /// The cells of a brick are listed in that order, too.
+        const FIRST_HALF: u32 = (1 << 13) - 1;
+        self.earlier.round(index) | self.own.round(index) & FIRST_HALF
     }
 
     /// The vertex that stands for an octant.

@@ -32,8 +32,40 @@ const ROUNDS: usize = 6;
 /// again.
 const STEP: f64 = 0.5;
 
+/// A position in fixed point, see [`Scale`].
+pub(super) type Fixed = [i32; 3];
+
 /// Positions, in segments: they grow into the room that topology repair leaves behind.
-pub(super) type Points = Segments<DVec3, 12>;
+pub(super) type Points = Segments<Fixed, 12>;
+
+/// Between cells and fixed point, of which a unit is 2^-30 of the root's side: half the bytes of doubles, and exact for the bounds that
+/// vertices keep.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scale {
+    /// A unit, in cells.
+    unit: f64,
+    /// Units a cell.
+    cell: f64,
+}
+
+impl Scale {
+    pub(super) fn new(depth: u32) -> Self {
+        let cell = f64::from(1u32 << (30 - depth));
+        Scale { unit: 1.0 / cell, cell }
+    }
+
+    /// From cells.
+    #[inline]
+    pub(super) fn fixed(self, point: DVec3) -> Fixed {
+        (point * self.cell + 0.5).to_array().map(|c| c as i32)
+    }
+
+    /// To cells.
+    #[inline]
+    pub(super) fn cells(self, point: Fixed) -> DVec3 {
+        DVec3::from(point.map(f64::from)) * self.unit
+    }
+}
 
 /// The positions of the vertices of touched cells, in cells, appended to `fixed`, those of the ring. Cost: linear in vertices and their
 /// neighbours, in parallel.
@@ -45,21 +77,22 @@ pub(super) fn place(
     fixed: Points,
 ) -> Points {
     let ring = fixed.len();
+    let scale = touched.scale();
     let mut points = fixed;
     let (count, piece) = touched.pieces();
     let of_bricks = |distances: &mut Distances, n| {
         let mut points = Vec::new();
         for brick in piece(n) {
             if placement == Placement::Centre {
-                middles(touched, brick, &mut points);
+                middles(touched, brick, scale, &mut points);
             } else {
                 distances.fill(octree, touched, brick);
-                distances.start(touched, brick, &mut points);
+                distances.start(touched, brick, scale, &mut points);
             }
         }
         points
     };
-    let append = |of_bricks: Vec<DVec3>| {
+    let append = |of_bricks: Vec<Fixed>| {
         points.extend_from_slice(&of_bricks);
         Ok(())
     };
@@ -88,7 +121,7 @@ const WAVE: usize = 64;
 /// the Z-order few of them wait at a time.
 fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: usize, points: &mut Points) {
     let (count, piece) = touched.pieces();
-    let mut waiting: Vec<(usize, Vec<DVec3>)> = Vec::new();
+    let mut waiting: Vec<(usize, Vec<Fixed>)> = Vec::new();
     for wave in (0..count).step_by(WAVE) {
         let end = count.min(wave + WAVE);
         let moved = |n| (n, moved(touched, neighbours, ring, points, piece(n)));
@@ -105,16 +138,27 @@ fn smooth(touched: &Touched, neighbours: &Neighbours, askers: &[usize], ring: us
 }
 
 /// Where the vertices of some bricks go in a round.
-fn moved(touched: &Touched, neighbours: &Neighbours, ring: usize, points: &Points, bricks: Range<usize>) -> Vec<DVec3> {
-    let mut moved = Vec::with_capacity((touched.first_of(bricks.end) - touched.first_of(bricks.start)) as usize);
+fn moved(touched: &Touched, neighbours: &Neighbours, ring: usize, points: &Points, bricks: Range<usize>) -> Vec<Fixed> {
+    let scale = touched.scale();
+    let vertices = [bricks.start, bricks.end].map(|brick| touched.first_of(brick) as usize);
+    let mut moved = Vec::with_capacity(vertices[1] - vertices[0]);
+    let [mut start, end] = vertices.map(|i| neighbours.start(i));
+    let list = neighbours.list.slice(start..end);
+    let mut rest = &*list;
     for (cell, at) in touched.bricks[bricks].iter().flat_map(TouchedBrick::cells) {
         let TouchedCell { first, shape, .. } = touched.cells[cell];
         let origin = DVec3::from(at.map(f64::from));
         for (i, [low, high]) in (first as usize..).zip(&touched.shapes[usize::from(shape)].ranges) {
-            let number = neighbours.places(i).len() as f64;
-            let mean = neighbours.of(i).map(|n| points[n as usize]).sum::<DVec3>() / number;
-            let to = points[ring + i].lerp(mean, STEP).clamp(origin + *low, origin + *high);
-            moved.push(touched.in_root(to));
+            let (own, further) = rest.split_at(neighbours.start(i + 1) - start);
+            (rest, start) = (further, start + own.len());
+            let mut sum = [0i64; 3];
+            for &n in own {
+                let point = points[n as usize];
+                (0..3).for_each(|a| sum[a] += i64::from(point[a]));
+            }
+            let mean = DVec3::from(sum.map(|sum| sum as f64)) * (scale.unit / own.len() as f64);
+            let to = scale.cells(points[ring + i]).lerp(mean, STEP).clamp(origin + *low, origin + *high);
+            moved.push(scale.fixed(touched.in_root(to)));
         }
     }
     moved
@@ -153,27 +197,21 @@ impl Neighbours {
         Neighbours { ends, list }
     }
 
-    /// Where the neighbours of a vertex stand in the list.
+    /// Where in the list the neighbours of a vertex begin, or the list ends.
     #[inline]
-    fn places(&self, i: usize) -> Range<usize> {
-        let start = if i == 0 { 0 } else { self.ends[i - 1] };
-        start as usize..self.ends[i] as usize
-    }
-
-    #[inline]
-    fn of(&self, i: usize) -> impl Iterator<Item = u32> + '_ {
-        self.places(i).map(|place| self.list[place])
+    fn start(&self, i: usize) -> usize {
+        if i == 0 { 0 } else { self.ends[i - 1] as usize }
     }
 }
 
 /// Appends the middles of the octants of each vertex of the cells of a brick, or of the cell if it has only one.
-fn middles(touched: &Touched, brick: usize, points: &mut Vec<DVec3>) {
+fn middles(touched: &Touched, brick: usize, scale: Scale, points: &mut Vec<Fixed>) {
     for (cell, at) in touched.bricks[brick].cells() {
         let shape = touched.shape(touched.cells[cell]);
         for vertex in 0..shape.vertices {
             let middle =
                 if shape.vertices == 1 { DVec3::splat(0.5) } else { middle_of_octants(shape.corners_of(vertex)) };
-            points.push(touched.in_root(DVec3::from(at.map(f64::from)) + middle));
+            points.push(scale.fixed(touched.in_root(DVec3::from(at.map(f64::from)) + middle)));
         }
     }
 }
@@ -207,7 +245,7 @@ impl Distances {
     }
 
     /// Appends the vertices of the cells of a brick before they are smoothed.
-    fn start(&self, touched: &Touched, brick: usize, points: &mut Vec<DVec3>) {
+    fn start(&self, touched: &Touched, brick: usize, scale: Scale, points: &mut Vec<Fixed>) {
         let brick = &touched.bricks[brick];
         for ((i, at), local) in brick.cells().zip(brick.plane.iter()) {
             let cell = touched.cells[i];
@@ -222,7 +260,7 @@ impl Distances {
                 let is_irregular = shape.irregular >> vertex & 1 == 1;
                 let start = if is_irregular { mean.lerp(middle(), 0.5) } else { mean };
                 let [low, high] = shape.ranges[usize::from(vertex)];
-                points.push(touched.in_root(origin + start.clamp(low, high)));
+                points.push(scale.fixed(touched.in_root(origin + start.clamp(low, high))));
             }
         }
     }

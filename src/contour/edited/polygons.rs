@@ -1,7 +1,7 @@
 //! The polygons round the vertices of touched cells, and which ones of the unedited surface they replace.
 
 use super::around::Around;
-use super::shapes::RINGS;
+use super::shapes::{RINGS, Ring};
 use super::touched::Touched;
 use crate::contour::layout::Layout;
 use crate::error::Result;
@@ -132,11 +132,8 @@ impl<'a> Patch<'a> {
             if matches!(signs, 0 | 255) {
                 continue;
             }
-            let here = around.index(at);
-            let own = |edge: &Edge| {
-                let number = 3 * edge.corners()[0].index() + edge.axis().index();
-                !RINGS[number].iter().any(|&(step, _)| around.is_before(here.wrapping_add_signed(step as isize), i))
-            };
+            let before = around.before(around.index(at));
+            let own = |edge: &Edge| before & RINGS[3 * edge.corners()[0].index() + edge.axis().index()].cells == 0;
             sum += Edge::ALL.into_iter().filter(|&e| is_crossed(signs, e)).filter(own).count() as u64;
         }
         sum
@@ -160,13 +157,15 @@ impl<'a> Patch<'a> {
     /// The polygons of the touched cells of a brick that no touched cell before has.
     fn polygons_of(&self, around: &mut Around<'_>, brick: usize, polygons: &mut Polygons) {
         around.fill(brick);
+        let all: &[Ring] = &RINGS;
         for (i, at) in self.touched.bricks[brick].cells() {
             let here = around.index(at);
+            let before = around.before(here);
             for &ring in &self.touched.shape(self.touched.cells[i]).rings {
-                let octants = RINGS[usize::from(ring)];
-                let cells = octants.map(|(step, _)| here.wrapping_add_signed(step as isize));
-                if !cells.iter().any(|&cell| around.is_before(cell, i)) {
-                    polygons.push(std::array::from_fn(|i| around.vertex(cells[i], octants[i].1)));
+                let Ring { octants, cells } = &all[usize::from(ring)];
+                if before & cells == 0 {
+                    let vertex = |(step, corner)| around.vertex(here.wrapping_add_signed(step as isize), corner);
+                    polygons.push(octants.map(vertex));
                 }
             }
         }

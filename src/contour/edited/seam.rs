@@ -52,7 +52,8 @@ impl<'a> Seam<'a> {
         let first = self.passed - self.dropped as u32;
         while let Some(&vertex) = self.ring.get(self.fixed.len()) {
             let Some(&point) = points.get((vertex - first) as usize) else { break };
-            self.fixed.push((point - self.frame.origin()) / self.frame.cell_size());
+            let in_cells = (point - self.frame.origin()) / self.frame.cell_size();
+            self.fixed.push(self.patch.touched.scale().fixed(in_cells));
         }
         self.passed += points.len() as u32;
         self.sink.points(points)
@@ -65,12 +66,13 @@ impl<'a> Seam<'a> {
         let ring = fixed.len();
         let points = place(self.octree, self.options.placement, self.patch.touched, &neighbours, fixed);
         drop(neighbours);
+        let scale = self.patch.touched.scale();
         let mut skipped = 0;
         points.parts().try_for_each(|part| {
             let start = (ring - skipped).min(part.len());
             skipped += start;
-            let in_model: Vec<DVec3> = part[start..].iter().map(|&point| self.frame.to_model(point)).collect();
-            self.sink.points(&in_model)
+            let to_model = |&point| self.frame.to_model(scale.cells(point));
+            self.sink.points(&part[start..].iter().map(to_model).collect::<Vec<DVec3>>())
         })
     }
 

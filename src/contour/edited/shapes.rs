@@ -13,8 +13,18 @@ use std::sync::LazyLock;
 /// from outside: steps to a cell, and a corner of it.
 type Octants = [([i32; 3], Corner); 4];
 
-/// The same, cells by their places in the [table](super::around) from that of the cell that asks.
-pub(super) type Ring = [(i32, Corner); 4];
+/// The same, as the [table](super::around) has it.
+pub(super) struct Ring {
+    /// Cells by their places in the table from that of the cell that asks.
+    pub(super) octants: [(i32, Corner); 4],
+    /// The cells as bits, numbered as by [`number`].
+    pub(super) cells: u32,
+}
+
+/// The number of a cell among the 27 round one, that one included: in the order of the steps to them.
+fn number(steps: [i32; 3]) -> u32 {
+    steps.into_iter().fold(0, |number, step| 3 * number + (step + 1) as u32)
+}
 
 /// What a cell sees of the complex, and what follows from it.
 #[derive(Debug)]
@@ -55,7 +65,11 @@ pub(super) static RINGS: LazyLock<Vec<Ring>> = LazyLock::new(|| {
     });
     let on = Face::ALL.into_iter().map(|face| directed(face.corners().map(|corner| ([0; 3], corner)), face.opposite()));
     let all = round(false).chain(round(true)).chain(beside).chain(on);
-    all.map(|ring| ring.map(|(steps, corner)| (steps_in_table(steps), corner))).collect()
+    let in_table = |ring: Octants| Ring {
+        octants: ring.map(|(steps, corner)| (steps_in_table(steps), corner)),
+        cells: ring.into_iter().fold(0, |cells, (steps, _)| cells | 1 << number(steps)),
+    };
+    all.map(in_table).collect()
 });
 
 /// Vertices keep this distance from the sides of their octants, in cells.

@@ -3,6 +3,7 @@
 //! All is done by bricks and planes. Edits of a brick, moved back along the axes on which they do not extend, are the cells round them;
 //! elements moved by the place of a part in its cell say which cells see that part.
 
+use super::place::Scale;
 use super::shapes::Shape;
 use crate::error::Result;
 use crate::grid::brick::{Bits, Local, Plane};
@@ -92,6 +93,11 @@ impl Touched {
     /// The nearest point of the root, in cells: cells beyond its boundary have vertices, too.
     pub(super) fn in_root(&self, p: DVec3) -> DVec3 {
         p.clamp(DVec3::ZERO, DVec3::splat(f64::from(1u32 << self.depth)))
+    }
+
+    /// The fixed point in which positions are kept.
+    pub(super) fn scale(&self) -> Scale {
+        Scale::new(self.depth)
     }
 
     /// Cost: linear in the edits, then some microseconds a brick and 60 ns a touched cell in parallel; while it lasts, 512 bytes an edited
